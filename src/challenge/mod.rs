@@ -1,0 +1,1 @@
+//! Concealed cases: made, sealed, analysed blind, revealed, scored.

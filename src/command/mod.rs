@@ -1,0 +1,21 @@
+//! The commands of `oare`, one a file: arguments in, exit code out. The work is in the library.
+
+use std::process::ExitCode;
+
+/// Done.
+pub const DONE: ExitCode = ExitCode::SUCCESS;
+
+/// Failed.
+pub fn failed() -> ExitCode {
+    ExitCode::from(1)
+}
+
+/// Wrong usage, configuration, or an unusable case.
+pub fn unusable() -> ExitCode {
+    ExitCode::from(2)
+}
+
+/// Done, and some input could not be used.
+pub fn done_in_part() -> ExitCode {
+    ExitCode::from(3)
+}

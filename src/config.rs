@@ -1,0 +1,1 @@
+//! Configuration: raw files, checked values, all faults at once.

@@ -1,0 +1,1 @@
+//! The one seam between producers and consumers of products.

@@ -1,0 +1,1 @@
+//! Bytes in, facts out, and back: sync marker, transfer frame, space packet, record.

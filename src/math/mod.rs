@@ -1,0 +1,1 @@
+//! Robust means, least squares, rotation, spectra and evidence, on slices and matrices only.

@@ -1,0 +1,1 @@
+//! Orbit, attitude, atmosphere, Sun, geomagnetic and gravity field; one force term a file.

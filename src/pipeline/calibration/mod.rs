@@ -1,0 +1,1 @@
+//! The calibration models: bias, scale factor, time correlation, and the faults of the instrument.

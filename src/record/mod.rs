@@ -1,0 +1,1 @@
+//! MCAP and table files out.
