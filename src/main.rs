@@ -15,9 +15,17 @@ struct Arguments {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    /// Dumps in, product files out: the pipeline without sockets.
+    Process(command::process::Args),
+}
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match arguments.command {}
+    let done = match Arguments::parse().command {
+        Command::Process(args) => command::process::run(args),
+    };
+    done.unwrap_or_else(|error| {
+        eprintln!("oare: {error:#}");
+        command::failed()
+    })
 }

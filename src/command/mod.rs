@@ -2,6 +2,8 @@
 
 use std::process::ExitCode;
 
+pub mod process;
+
 /// Done.
 pub const DONE: ExitCode = ExitCode::SUCCESS;
 
