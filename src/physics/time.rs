@@ -84,9 +84,9 @@ pub fn gast_rad(unix_s: f64) -> f64 {
 /// (Meeus, Astronomical Algorithms, 2nd ed., ch. 22).
 pub fn nutation(unix_s: f64) -> (f64, f64) {
     let t = centuries_tt(unix_s);
-    let node = (125.044_52 - 1934.136_261 * t).to_radians();
-    let sun = (280.4665 + 36_000.7698 * t).to_radians();
-    let moon = (218.3165 + 481_267.8813 * t).to_radians();
+    let node = (125.044_52 - 1_934.136_261 * t).to_radians();
+    let sun = (280.466_5 + 36_000.769_8 * t).to_radians();
+    let moon = (218.316_5 + 481_267.881_3 * t).to_radians();
     let dpsi_as =
         -17.20 * node.sin() - 1.32 * (2.0 * sun).sin() - 0.23 * (2.0 * moon).sin() + 0.21 * (2.0 * node).sin();
     let deps_as = 9.20 * node.cos() + 0.57 * (2.0 * sun).cos() + 0.10 * (2.0 * moon).cos() - 0.09 * (2.0 * node).cos();
