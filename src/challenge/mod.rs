@@ -1,1 +1,3 @@
 //! Concealed cases: made, sealed, analysed blind, revealed, scored.
+
+pub mod conceal;
