@@ -111,13 +111,7 @@ pub fn sunlit(flight: &Flight) -> Vec<f64> {
     pairs.map(|(t, r)| shadow::sunlit_fraction(r, &sun_unit(*t))).collect()
 }
 
-/// The Sun's direction in body axes.
-pub fn sun_body(flight: &Flight) -> Series {
-    flight.times_s.iter().zip(&flight.body).map(|(t, body)| body * sun_unit(*t)).collect()
-}
-
-/// The geomagnetic field in body axes, tesla, every 60 s and linear between (it turns by 4 deg a minute at most, in inertial axes
-/// less), carried in inertial axes.
+/// The geomagnetic field in body axes, tesla, every 60 s and linear between in inertial axes, where it turns slowly.
 pub fn field_t(flight: &Flight) -> Series {
     const STRIDE: usize = 12;
     let last = flight.times_s.len() - 1;

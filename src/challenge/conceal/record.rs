@@ -7,7 +7,7 @@ use rand_chacha::ChaCha12Rng;
 
 use super::draw::{between, log_between, normal, pick};
 use super::flight::{FILE_STRIDE, Flight, LENGTH_S, MARGIN_S, STEP_S};
-use super::force::{self, Series};
+use super::force;
 use super::noise::{Noise, WINDOW_STEP_S};
 
 /// Half of a window, in points of the 5 s grid.
@@ -214,9 +214,4 @@ fn case_toml(id: &str, flight: &Flight) -> String {
 pub fn simulated_density(flight: &Flight, lacks_bulge: bool) -> Vec<f64> {
     let bulge = if lacks_bulge { 0.0 } else { 1.0 };
     force::density(flight, force::Air { bulge, ..force::WHOLE_AIR })
-}
-
-/// A series of zeros on the flight's grid.
-pub fn zeros(flight: &Flight) -> Series {
-    vec![Vector3::zeros(); flight.times_s.len()]
 }
