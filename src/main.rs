@@ -15,9 +15,16 @@ struct Arguments {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    Challenge(command::challenge::Args),
+}
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match arguments.command {}
+    let result = match Arguments::parse().command {
+        Command::Challenge(args) => command::challenge::run(args),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("oare: {error:#}");
+        command::unusable()
+    })
 }

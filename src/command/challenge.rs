@@ -33,8 +33,13 @@ pub struct Args {
 
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let kinds = if args.kinds.is_empty() { Kind::ALL.to_vec() } else { args.kinds.clone() };
     let only = args.effect.as_deref().map(known).transpose()?;
+    let kinds = match (args.kinds.is_empty(), only) {
+        (false, _) => args.kinds.clone(),
+        (true, None) => Kind::ALL.to_vec(),
+        (true, Some(id)) if effect::IDS.contains(&id) => vec![Kind::One],
+        (true, Some(_)) => vec![Kind::Unknown],
+    };
     let orders = run::plan(args.cases, args.seed, &kinds, args.other_physics, only);
     let progress = bar(orders.len(), "sealing");
     let seals = run::seal(&orders, &progress);

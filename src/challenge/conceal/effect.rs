@@ -106,7 +106,8 @@ impl Drawn {
             "solar_radiation_pressure" => p.push(("coefficient".into(), 1.3)),
             "cg_offset" | "mass_shift" => {
                 if id == "mass_shift" {
-                    let onset = flight.events.iter().find(|e| e.kind == "mass_change").map_or(flight.start_s, |e| e.clock_s);
+                    let onset =
+                        flight.events.iter().find(|e| e.kind == "mass_change").map_or(flight.start_s, |e| e.clock_s);
                     p.push(("onset_s".into(), onset));
                 }
                 triple(&mut p, ["dx_m", "dy_m", "dz_m"], direction(rng) * 0.3);
@@ -308,4 +309,3 @@ fn triple(p: &mut Vec<(String, f64)>, names: [&str; 3], v: Vector3<f64>) {
 fn push(p: &mut Vec<(String, f64)>, rng: &mut ChaCha12Rng) {
     triple(p, ["ax_ng", "ay_ng", "az_ng"], direction(rng) * 100.0);
 }
-

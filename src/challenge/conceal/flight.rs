@@ -218,7 +218,8 @@ fn pull(r: &Vector3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
     let radius = r.norm();
     let factor = 1.5 * J2 * MU_M3_S2 * EARTH_RADIUS_M * EARTH_RADIUS_M / radius.powi(5);
     let z = 5.0 * (r.z / radius).powi(2);
-    -r * (MU_M3_S2 / radius.powi(3)) - Vector3::new(r.x * (1.0 - z), r.y * (1.0 - z), r.z * (3.0 - z)) * factor
+    -r * (MU_M3_S2 / radius.powi(3))
+        - Vector3::new(r.x * (1.0 - z), r.y * (1.0 - z), r.z * (3.0 - z)) * factor
         - v * (1.0e-6 / v.norm())
 }
 
@@ -249,8 +250,7 @@ fn plan(rng: &mut ChaCha12Rng, start_s: f64, freedom: Freedom) -> Vec<Attitude> 
     for from_s in from_s {
         loop {
             let inertial = !freedom.single_attitude && rng.random_bool(0.3);
-            let (hold, list) =
-                if inertial { (Hold::Inertial, &INERTIAL_DEG[..]) } else { (Hold::Lvlh, &LVLH_DEG[..]) };
+            let (hold, list) = if inertial { (Hold::Inertial, &INERTIAL_DEG[..]) } else { (Hold::Lvlh, &LVLH_DEG[..]) };
             let next = Attitude { from_s, hold, euler_deg: *pick(rng, list) };
             if plan.last().is_none_or(|last| last.hold != next.hold || last.euler_deg != next.euler_deg) {
                 plan.push(next);
@@ -342,7 +342,8 @@ fn density(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>], freedom: 
         .zip(times_s)
         .map(|(r, t)| {
             let radius = r.norm();
-            let wave: f64 = waves.iter().map(|(period, phase)| (std::f64::consts::TAU * t / period + phase).sin()).sum();
+            let wave: f64 =
+                waves.iter().map(|(period, phase)| (std::f64::consts::TAU * t / period + phase).sin()).sum();
             let shape = 1.0 + 0.5 * structure * wave + lat * (3.0 * (r.z / radius).powi(2) * 4.0 - 1.0);
             at_300_km * (-(radius - EARTH_RADIUS_M - 300e3) / scale_m).exp() * shape
         })

@@ -82,9 +82,8 @@ pub fn drag(flight: &Flight, air: Air) -> Series {
             let wind = flight.body[k] * (v - moving);
             let speed = wind.norm();
             let u = wind / speed;
-            let area: f64 = (0..3)
-                .map(|i| u[i].abs() * vehicle.area_m2[i] * vehicle.face_scale[usize::from(u[i] < 0.0)][i])
-                .sum();
+            let area: f64 =
+                (0..3).map(|i| u[i].abs() * vehicle.area_m2[i] * vehicle.face_scale[usize::from(u[i] < 0.0)][i]).sum();
             let size = 0.5 * density[k] * vehicle.drag_coefficient * area / vehicle.mass_kg * speed * speed;
             u * (-size / NANO_G_M_S2)
         })

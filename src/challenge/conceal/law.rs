@@ -97,7 +97,13 @@ fn snap(rng: &mut ChaCha12Rng, lit: &[f64]) -> Vec<f64> {
     lit.iter()
         .map(|lit| {
             let now = *lit > 0.5;
-            state = if now == before { state * keep } else if now { 1.0 } else { -0.6 };
+            state = if now == before {
+                state * keep
+            } else if now {
+                1.0
+            } else {
+                -0.6
+            };
             before = now;
             state
         })
@@ -137,8 +143,10 @@ fn play(temperature_c: &[f64], slack_c: f64) -> Vec<f64> {
 
 fn echo(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
     let (delay, tau) = (between(rng, 900.0, 4500.0), between(rng, 400.0, 2500.0));
-    let kinds: Vec<&str> =
-        ["water_dump", "evaporator", "crew_sleep"].into_iter().filter(|k| flight.events.iter().any(|e| e.kind == *k)).collect();
+    let kinds: Vec<&str> = ["water_dump", "evaporator", "crew_sleep"]
+        .into_iter()
+        .filter(|k| flight.events.iter().any(|e| e.kind == *k))
+        .collect();
     let kind = *pick(rng, &kinds);
     let mut shape = vec![0.0; flight.times_s.len()];
     for event in flight.events.iter().filter(|e| e.kind == kind) {

@@ -103,7 +103,9 @@ impl<'a> Matched<'a> {
             "cg_offset" => vec![Group::Columns(offset())],
             "mass_shift" => {
                 let events = flight.events.iter().filter(|e| e.kind == "mass_change");
-                let gate = |c: Series, t0: f64| -> Series { since(t0).zip(c).map(|(t, a)| a * f64::from(u8::from(t > 0.0))).collect() };
+                let gate = |c: Series, t0: f64| -> Series {
+                    since(t0).zip(c).map(|(t, a)| a * f64::from(u8::from(t > 0.0))).collect()
+                };
                 events.map(|e| Group::Columns(offset().into_iter().map(|c| gate(c, e.clock_s)).collect())).collect()
             }
             "magnetic_sensitivity" => {
@@ -111,9 +113,9 @@ impl<'a> Matched<'a> {
                 let column = |i: usize, j: usize| field.iter().map(|b| Vector3::ith(i, b[j] * 1e6)).collect();
                 vec![Group::Columns((0..9).map(|ij| column(ij / 3, ij % 3)).collect())]
             }
-            "scale_factor" => (0..3)
-                .map(|i| Group::Columns(vec![total.iter().map(|a| Vector3::ith(i, a[i])).collect()]))
-                .collect(),
+            "scale_factor" => {
+                (0..3).map(|i| Group::Columns(vec![total.iter().map(|a| Vector3::ith(i, a[i])).collect()])).collect()
+            }
             "misalignment" => {
                 let turned = |i: usize| total.iter().map(|a| a.cross(&Vector3::ith(i, 1.0))).collect();
                 vec![Group::Columns((0..3).map(turned).collect())]

@@ -136,7 +136,7 @@ impl Question {
     fn draw(rng: &mut ChaCha12Rng, order: &Order, quieter: f64) -> Self {
         let freedom = Freedom { single_attitude: order.kind == Kind::Single, other_physics: order.other_physics };
         let mut flight = Flight::draw(rng, freedom);
-        let ids = ids(rng, order, &flight);
+        let ids = ids(rng, order);
         for id in &ids {
             require(rng, &mut flight, id);
         }
@@ -184,7 +184,8 @@ impl Question {
     /// Whether the question can be asked: loud enough, of a possible size, and hard in the way its kind says.
     fn is_fair(&self, kind: Kind) -> bool {
         let loud = self.snr.iter().all(|snr| *snr >= SNR_MIN && *snr < 400.0);
-        let rms_ng = |series: &Series| (series.iter().map(Vector3::norm_squared).sum::<f64>() / series.len() as f64).sqrt();
+        let rms_ng =
+            |series: &Series| (series.iter().map(Vector3::norm_squared).sum::<f64>() / series.len() as f64).sqrt();
         let possible = self.parts.iter().all(|(_, _, series)| rms_ng(series) < 800.0);
         loud && possible
             && match kind {
@@ -246,15 +247,18 @@ impl Question {
 /// Effects that others imitate when there is one attitude only.
 const IMITATED: [&str; 5] = ["aerodynamic_drag", "scale_factor", "mass_shift", "atmosphere_corotation", "misalignment"];
 
-fn ids(rng: &mut ChaCha12Rng, order: &Order, _flight: &Flight) -> Vec<&'static str> {
+fn ids(rng: &mut ChaCha12Rng, order: &Order) -> Vec<&'static str> {
     let count = match order.kind {
         Kind::Clean | Kind::Slow => return Vec::new(),
-        Kind::Unknown => return vec![order.only.unwrap_or_else(|| pick(rng, &law::LAWS).0)],
+        Kind::Unknown => {
+            let asked = order.only.filter(|id| law::LAWS.iter().any(|(name, _)| name == id));
+            return vec![asked.unwrap_or_else(|| pick(rng, &law::LAWS).0)];
+        }
         Kind::Two => 2,
         Kind::One | Kind::Single | Kind::Deleted => 1,
     };
     let list = if order.kind == Kind::Single { &IMITATED[..] } else { &effect::IDS[..] };
-    let mut ids: Vec<&'static str> = order.only.into_iter().collect();
+    let mut ids: Vec<&'static str> = order.only.into_iter().filter(|id| effect::IDS.contains(id)).collect();
     while ids.len() < count {
         let id = *pick(rng, list);
         if !ids.contains(&id) {

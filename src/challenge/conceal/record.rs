@@ -162,11 +162,7 @@ fn ancillary(flight: &Flight, density_kg_m3: &[f64]) -> String {
         row(
             &mut text,
             &t,
-            &[
-                (flight.position_m[k].as_slice(), 2),
-                (flight.velocity_m_s[k].as_slice(), 5),
-                (&[q.w, q.i, q.j, q.k], 9),
-            ],
+            &[(flight.position_m[k].as_slice(), 2), (flight.velocity_m_s[k].as_slice(), 5), (&[q.w, q.i, q.j, q.k], 9)],
         );
         text.pop();
         let _ = writeln!(

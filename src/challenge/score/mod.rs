@@ -49,10 +49,8 @@ pub struct Score {
 pub fn score(outcomes: &[Outcome]) -> Score {
     let answered: Vec<(&Truth, &Answer)> =
         outcomes.iter().filter_map(|o| o.answer.as_ref().ok().map(|a| (&o.truth, a))).collect();
-    let failed = outcomes
-        .iter()
-        .filter_map(|o| o.answer.as_ref().err().map(|e| (o.truth.case.clone(), e.clone())))
-        .collect();
+    let failed =
+        outcomes.iter().filter_map(|o| o.answer.as_ref().err().map(|e| (o.truth.case.clone(), e.clone()))).collect();
     Score {
         cases: outcomes.len(),
         failed,
@@ -94,7 +92,12 @@ fn rates(all: &[Pair]) -> Vec<Rate> {
         of(&plain(5.0, 8.0), &first, "  the same, identifiable, SNR 5 to 8", "80 %"),
         of(&|p| listed(p) && p.0.snr_min() >= 8.0, &inside, "truth inside the reported set, SNR 8 and more", "99.5 %"),
         of(&one_in(12.0, ALL), &exact, "exactly right, one effect, SNR 12 and more", "98 %"),
-        of(&|p| p.0.kind == "two" && p.0.snr_min() >= 12.0, &exact, "exactly right, two effects, SNR 12 and more", "95 %"),
+        of(
+            &|p| p.0.kind == "two" && p.0.snr_min() >= 12.0,
+            &exact,
+            "exactly right, two effects, SNR 12 and more",
+            "95 %",
+        ),
         of(&kind(&["unknown"]), &unexplained, "unlisted law: flagged unexplained", "95 %"),
         of(&kind(&["unknown"]), &named, "unlisted law: given a physical name", "<= 3 %"),
         of(&kind(&["deleted"]), &unexplained, "deleted effect: flagged unexplained", "95 %"),
@@ -103,7 +106,13 @@ fn rates(all: &[Pair]) -> Vec<Rate> {
         of(&kind(&["single"]), &honest, "unidentifiable: declared ambiguous, truth in the set", "95 %"),
     ];
     let checks: Vec<(String, bool)> = all.iter().flat_map(|p| answer::within_two_sigma(p.0, p.1)).collect();
-    rates.push(Rate::over("parameters within 2 sigma", "95.4 +- 1.5 %", checks.iter(), &|c: &(String, bool)| c.1, |c| c.0.clone()));
+    rates.push(Rate::over(
+        "parameters within 2 sigma",
+        "95.4 +- 1.5 %",
+        checks.iter(),
+        &|c: &(String, bool)| c.1,
+        |c| c.0.clone(),
+    ));
     rates.retain(|rate| rate.of > 0);
     rates
 }
@@ -184,7 +193,8 @@ mod tests {
     #[test]
     fn a_silent_answer_is_right_on_a_clean_case_and_wrong_on_a_loud_one() {
         let silent = r#"{"verdict":"consistent","effects":[]}"#;
-        let score = score(&[outcome("clean", None, 0.0, silent), outcome("one", Some("aerodynamic_drag"), 30.0, silent)]);
+        let score =
+            score(&[outcome("clean", None, 0.0, silent), outcome("one", Some("aerodynamic_drag"), 30.0, silent)]);
         assert_eq!(value(&score, "false alarm, clean"), (0, 1));
         assert_eq!(value(&score, "right first name, SNR 12 and more"), (0, 1));
         assert_eq!(value(&score, "truth inside the reported set, SNR 8 and more"), (0, 1));

@@ -25,10 +25,20 @@ impl fmt::Display for Score {
         }
         if let Some([reported, floor]) = self.excess_removed {
             let value = format!("{:.1} % ({:.1} %)", 100.0 * reported, 100.0 * floor);
-            writeln!(f, "{:<56} {:>20}  {:<17} 97 %", "held-out excess removed, SNR 20+ (by the true floor)", value, "")?;
+            writeln!(
+                f,
+                "{:<56} {:>20}  {:<17} 97 %",
+                "held-out excess removed, SNR 20+ (by the true floor)", value, ""
+            )?;
         }
         let [median, late] = self.seconds;
-        writeln!(f, "{:<56} {:>18.2} s  {:<17} 1 s", "time a case, median (95th percentile)", median, format!("({late:.2} s)"))?;
+        writeln!(
+            f,
+            "{:<56} {:>18.2} s  {:<17} 1 s",
+            "time a case, median (95th percentile)",
+            median,
+            format!("({late:.2} s)")
+        )?;
         for (case, reason) in &self.failed {
             writeln!(f, "no answer to {case}: {reason}")?;
         }
