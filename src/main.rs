@@ -18,11 +18,14 @@ struct Arguments {
 enum Command {
     /// Dumps in, product files out: the pipeline without sockets.
     Process(command::process::Args),
+    /// Makes, seals, runs and scores concealed cases.
+    Challenge(command::challenge::Args),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Process(args) => command::process::run(args),
+        Command::Challenge(args) => command::challenge::run(args),
     };
     done.unwrap_or_else(|error| {
         eprintln!("oare: {error:#}");
