@@ -16,15 +16,19 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Dumps in, product files out: the pipeline without sockets.
+    Process(command::process::Args),
+    /// Makes, seals, runs and scores concealed cases.
     Challenge(command::challenge::Args),
 }
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let done = match Arguments::parse().command {
+        Command::Process(args) => command::process::run(args),
         Command::Challenge(args) => command::challenge::run(args),
     };
-    result.unwrap_or_else(|error| {
+    done.unwrap_or_else(|error| {
         eprintln!("oare: {error:#}");
-        command::unusable()
+        command::failed()
     })
 }

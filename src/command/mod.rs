@@ -4,6 +4,8 @@ pub mod challenge;
 
 use std::process::ExitCode;
 
+pub mod process;
+
 /// Done.
 pub const DONE: ExitCode = ExitCode::SUCCESS;
 
