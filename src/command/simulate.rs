@@ -51,7 +51,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
     let bar = indicatif::ProgressBar::new(u64::from(mission.config().end_clock_s() - mission.config().start_clock_s));
     let link = LinkConfig::default();
-    let (mut packetiser, mut framer, mut truth) = (Packetiser::default(), Framer::new(link, 1, 0), TruthBuilder::default());
+    let (mut packetiser, mut framer, mut truth) =
+        (Packetiser::default(), Framer::new(link, 1, 0), TruthBuilder::default());
     let (mut frames, mut windows, mut seconds) = (Vec::new(), Vec::new(), 0u64);
     for second in mission.fly() {
         for sent in &second.sent {

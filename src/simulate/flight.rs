@@ -209,8 +209,11 @@ impl<'a> Flight<'a> {
     fn on_the_table(&self, segment: &Segment, angle_rad: f64, rate_rad_s: f64, felt_ng: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = felt_ng;
         let (sin, cos) = angle_rad.sin_cos();
-        let mut turned =
-            if segment.target == 1 { [x * cos + y * sin, -x * sin + y * cos, z] } else { [x, y * cos + z * sin, -y * sin + z * cos] };
+        let mut turned = if segment.target == 1 {
+            [x * cos + y * sin, -x * sin + y * cos, z]
+        } else {
+            [x, y * cos + z * sin, -y * sin + z * cos]
+        };
         let axis = segment.target_axis();
         turned[axis] += self.mission.config.instrument.radius_m[axis] * rate_rad_s * rate_rad_s / NANO_G_M_S2;
         turned
@@ -259,9 +262,8 @@ impl<'a> Flight<'a> {
         let instrument = &self.mission.config.instrument;
         std::array::from_fn(|axis| {
             let name = Axis::ALL[axis];
-            let in_range = |range: Range| {
-                felt_ng[axis] / instrument.ng_per_count(name, range) + now.bias[axis][range.index()]
-            };
+            let in_range =
+                |range: Range| felt_ng[axis] / instrument.ng_per_count(name, range) + now.bias[axis][range.index()];
             self.autorange.feel(axis, clock_s, in_range(Range::C) / rail, in_range(Range::B) / rail);
             let range = now.ranges[axis];
             let extra = now.segment.map_or(0.0, |segment| self.extra_counts(&segment, clock_s, axis));
@@ -324,7 +326,8 @@ impl<'a> Flight<'a> {
     fn events(&mut self, changes: &[(usize, Range)]) -> Vec<Event> {
         let clock = Clock::from_tenths(i64::from(self.clock_s) * 10);
         let mut events = Vec::new();
-        while let Some(&(at_s, code, argument, text)) = self.events.get(self.next_event).filter(|e| e.0 <= self.clock_s) {
+        while let Some(&(at_s, code, argument, text)) = self.events.get(self.next_event).filter(|e| e.0 <= self.clock_s)
+        {
             self.next_event += 1;
             match code {
                 EventCode::BiasEnd => self.counters.bias_done += 1,
@@ -390,7 +393,14 @@ impl Iterator for Flight<'_> {
             self.onboard.interrupt();
         }
         self.clock_s += 1;
-        Some(Second { clock_s, sent, quasi_steady_ng, temperature_c, normal: mode == Mode::Normal, true_ranges: ranges })
+        Some(Second {
+            clock_s,
+            sent,
+            quasi_steady_ng,
+            temperature_c,
+            normal: mode == Mode::Normal,
+            true_ranges: ranges,
+        })
     }
 }
 
@@ -491,7 +501,8 @@ impl Jitter {
 /// Events of the plan that are no calibration's.
 fn plan_events(mission: &Mission) -> Vec<ScheduledEvent> {
     let config = &mission.config;
-    let mut events = vec![(0, EventCode::PowerOn, 0, ""), (config.time.liftoff_clock_s as u32, EventCode::LiftOff, 0, "")];
+    let mut events =
+        vec![(0, EventCode::PowerOn, 0, ""), (config.time.liftoff_clock_s as u32, EventCode::LiftOff, 0, "")];
     for (from_s, to_s) in &config.quiet {
         events.push((*from_s, EventCode::QuietOn, 0, ""));
         events.push((*to_s, EventCode::QuietOff, 0, ""));

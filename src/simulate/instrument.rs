@@ -34,10 +34,7 @@ impl BiasLaw {
 
     /// The bias, counts.
     pub fn counts(&self, met_h: f64, temperature_c: f64) -> f64 {
-        self.a1
-            + self.a2 * (-met_h / self.t0_h).exp()
-            + self.a3 * (-met_h / self.t1_h).exp()
-            + self.a4 * temperature_c
+        self.a1 + self.a2 * (-met_h / self.t0_h).exp() + self.a3 * (-met_h / self.t1_h).exp() + self.a4 * temperature_c
     }
 }
 

@@ -126,7 +126,12 @@ impl MissionConfig {
         let drift = self.clock_drift_ppm;
         expect(drift.abs() <= 1000.0, "clock_drift_ppm", drift.to_string(), "at most 1000 ppm either way");
         let interval = self.calibration.interval_s;
-        expect(interval >= 3600, "calibration.interval_s", interval.to_string(), "an hour at least, a calibration takes 37 minutes");
+        expect(
+            interval >= 3600,
+            "calibration.interval_s",
+            interval.to_string(),
+            "an hour at least, a calibration takes 37 minutes",
+        );
         problems.extend(self.instrument.problems());
         problems
     }

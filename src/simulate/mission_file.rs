@@ -6,7 +6,6 @@ use serde::Deserialize;
 
 use crate::physics::orbit::Elements;
 use crate::physics::{Mat3, Vec3};
-use crate::units::MissionTime;
 
 use super::SimulateError;
 use super::faults::Fault;
@@ -39,7 +38,8 @@ pub struct Overrides {
 /// # Errors
 /// A sentence with the place in the file for what does not read; everything wrong with the values, at once.
 pub fn from_toml(text: &str, overrides: Overrides) -> Result<MissionFile, Vec<SimulateError>> {
-    let raw: Raw = toml::from_str(text).map_err(|error| vec![SimulateError::File(error.to_string().trim().to_owned())])?;
+    let raw: Raw =
+        toml::from_str(text).map_err(|error| vec![SimulateError::File(error.to_string().trim().to_owned())])?;
     let file = raw.checked(overrides)?;
     let problems = file.mission.problems();
     if problems.is_empty() { Ok(file) } else { Err(problems) }
@@ -51,7 +51,7 @@ struct Raw {
     seed: Option<u64>,
     hours: Option<f64>,
     start_clock_s: Option<u32>,
-    epoch_utc: Option<jiff::Timestamp>,
+    epoch_utc: Option<String>,
     liftoff_clock_s: Option<f64>,
     manoeuvre_s: Option<f64>,
     wobble_rad: Option<f64>,
@@ -225,11 +225,13 @@ impl Raw {
             mission.start_clock_s = start_clock_s;
             mission.attitudes.iter_mut().for_each(|hold| hold.from_clock_s += shift_s);
         }
-        let sts65 = MissionTime::sts65();
-        mission.time = MissionTime {
-            epoch_utc: self.epoch_utc.unwrap_or(sts65.epoch_utc),
-            liftoff_clock_s: self.liftoff_clock_s.unwrap_or(sts65.liftoff_clock_s),
-        };
+        if let Some(text) = &self.epoch_utc {
+            mission.time.epoch_utc = text.parse().map_err(|_| {
+                let (name, expected) = ("epoch_utc", "a UTC instant such as 1994-07-08T12:53:01Z");
+                vec![SimulateError::Value { name, found: text.clone(), expected }]
+            })?;
+        }
+        set(&mut mission.time.liftoff_clock_s, self.liftoff_clock_s);
         set(&mut mission.manoeuvre_s, self.manoeuvre_s);
         set(&mut mission.wobble_rad, self.wobble_rad);
         set(&mut mission.clock_drift_ppm, self.clock_drift_ppm);
@@ -428,7 +430,8 @@ mod tests {
 
     #[test]
     fn every_wrong_value_is_told_at_once() {
-        let error = from_toml("hours = -3\nstart_clock_s = 7\n[vehicle]\nmass_kg = 0", Overrides::default()).unwrap_err();
+        let error =
+            from_toml("hours = -3\nstart_clock_s = 7\n[vehicle]\nmass_kg = 0", Overrides::default()).unwrap_err();
         let text: Vec<String> = error.iter().map(ToString::to_string).collect();
         assert_eq!(text.len(), 3, "{text:?}");
         assert!(text[0].contains("hours is -3"), "{text:?}");

@@ -23,7 +23,6 @@ pub mod recorder;
 pub mod trajectory;
 pub mod truth;
 
-
 pub use faults::Fault;
 pub use flight::{Flight, Second, Sent};
 pub use mission::{Mission, MissionConfig};
