@@ -18,9 +18,14 @@ pub struct Matched<'a> {
     ones: [Vec<f64>; 3],
 }
 
+/// No wind beside co-rotation is stronger than this, m/s.
+const WIND_M_S_MAX: f64 = 600.0;
+
 /// One way an effect can imitate: columns on all axes, or one shape that every axis may carry with its own size.
 enum Group {
     Columns(Vec<Series>),
+    /// Columns whose sizes together must stay below 1: an imitation no flight could have is none.
+    Within(Vec<Series>),
     Shape(Vec<f64>),
 }
 
@@ -69,17 +74,15 @@ impl<'a> Matched<'a> {
             .collect()
     }
 
-    /// Whether two signatures are so alike that a pair of them cannot be a fair question.
-    pub fn overlap(a: &White, b: &White) -> f64 {
-        let product: f64 = a.iter().zip(b).map(|(a, b)| dot(a, b)).sum();
-        product.abs() / (Self::snr(a) * Self::snr(b)).max(1e-12)
-    }
-
     fn left_of(&self, white: &White, group: &Group) -> f64 {
         match group {
             Group::Columns(columns) => {
                 let columns: Vec<White> = columns.iter().map(|c| self.white(c)).collect();
-                least(white, &columns)
+                least(white, &columns, f64::INFINITY)
+            }
+            Group::Within(columns) => {
+                let columns: Vec<White> = columns.iter().map(|c| self.white(c)).collect();
+                least(white, &columns, 1.0)
             }
             Group::Shape(shape) => {
                 let series: Series = shape.iter().map(|x| Vector3::new(*x, *x, *x)).collect();
@@ -133,7 +136,7 @@ impl<'a> Matched<'a> {
             }
             "thermospheric_wind" => {
                 let wind = |wind_m_s| force::minus(&force::drag(flight, Air { wind_m_s, ..signal.air }), &signal.drag);
-                vec![Group::Columns(vec![wind([100.0, 0.0]), wind([0.0, 100.0])])]
+                vec![Group::Within(vec![wind([WIND_M_S_MAX, 0.0]), wind([0.0, WIND_M_S_MAX])])]
             }
             "atmosphere_corotation" => {
                 let other = force::drag(flight, Air { corotation: 1.0 - signal.air.corotation, ..signal.air });
@@ -178,15 +181,17 @@ fn unit_parameters(id: &str) -> Vec<(String, f64)> {
     vec![(name.to_string(), 1.0)]
 }
 
-/// Norm of what least squares on these columns leaves.
-fn least(white: &White, columns: &[White]) -> f64 {
+/// Norm of what least squares on these columns leaves; all of it when their sizes exceed `size_max` in all.
+fn least(white: &White, columns: &[White], size_max: f64) -> f64 {
     let n = columns.len();
     let inner = |a: &White, b: &White| (0..3).map(|i| dot(&a[i], &b[i])).sum::<f64>();
     // Columns of unit norm, so that one threshold tells dependence from size.
     let norms: Vec<f64> = columns.iter().map(|c| inner(c, c).sqrt().max(1e-12)).collect();
     let gram = DMatrix::from_fn(n, n, |i, j| inner(&columns[i], &columns[j]) / (norms[i] * norms[j]));
     let right = DVector::from_fn(n, |i, _| inner(&columns[i], white) / norms[i]);
-    let explained = gram.svd(true, true).solve(&right, 1e-9).map_or(0.0, |x| x.dot(&right));
+    let Ok(x) = gram.svd(true, true).solve(&right, 1e-9) else { return Matched::snr(white) };
+    let size = x.iter().zip(&norms).map(|(x, norm)| (x / norm).powi(2)).sum::<f64>().sqrt();
+    let explained = if size <= size_max { x.dot(&right) } else { 0.0 };
     (inner(white, white) - explained).max(0.0).sqrt()
 }
 

@@ -99,6 +99,8 @@ pub fn draw(kind: Kind, seed: u64) -> Concealed {
 const ATTEMPTS: u64 = 24;
 /// Least SNR of a question that is asked.
 const SNR_MIN: f64 = 5.0;
+/// An unlisted law keeps at least this SNR against the nearest effect of the catalogue.
+const UNLISTED_SNR: f64 = 5.0;
 
 /// Draws a case to order.
 pub fn draw_order(order: &Order) -> Concealed {
@@ -128,7 +130,7 @@ struct Question {
     felt: Series,
     parts: Vec<(String, BTreeMap<String, serde_json::Value>, Series)>,
     snr: Vec<f64>,
-    overlap: f64,
+    apart: f64,
     left: Vec<(&'static str, f64)>,
 }
 
@@ -172,13 +174,17 @@ impl Question {
             felt = force::plus(&felt, series);
         }
         snr.extend(whites.iter().map(Matched::snr));
-        let left = match whites.as_slice() {
-            [only] => matched.left(only, &signal, &felt),
-            _ => Vec::new(),
-        };
-        let overlap = if let [a, b] = whites.as_slice() { Matched::overlap(a, b) } else { 0.0 };
+        // Of a pair, what its own effects leave of each other; of one, what any effect leaves of it.
+        let lefts: Vec<Vec<(&'static str, f64)>> = whites.iter().map(|w| matched.left(w, &signal, &felt)).collect();
+        let left = if let [only] = lefts.as_slice() { only.clone() } else { Vec::new() };
+        let apart = (0..lefts.len() * usize::from(lefts.len() == 2))
+            .map(|i| {
+                let other = &parts[1 - i].0;
+                lefts[i].iter().find(|(id, _)| id == other).map_or(0.0, |(_, left)| left / snr[i])
+            })
+            .fold(1.0, f64::min);
         drop(matched);
-        Self { flight, noise, kept, signal, felt, parts, snr, overlap, left }
+        Self { flight, noise, kept, signal, felt, parts, snr, apart, left }
     }
 
     /// Whether the question can be asked: loud enough, of a possible size, and hard in the way its kind says.
@@ -189,13 +195,18 @@ impl Question {
         let possible = self.parts.iter().all(|(_, _, series)| rms_ng(series) < 800.0);
         loud && possible
             && match kind {
-                Kind::Two => self.overlap < 0.8,
+                Kind::Two => self.apart > 0.5,
                 Kind::Single => self.snr.iter().all(|snr| *snr >= 8.0) && !self.confusable().is_empty(),
-                // A law that the catalogue imitates to within the noise is no unlisted law.
-                Kind::Unknown => self.left.iter().all(|(_, left)| *left > CONFUSABLE_SNR),
-                Kind::Deleted => self.confusable().is_empty(),
+                // A law that one effect of the catalogue nearly imitates is no unlisted law.
+                Kind::Unknown | Kind::Deleted => self.nearest() > f64::max(UNLISTED_SNR, 0.5 * self.snr[0]),
                 _ => true,
             }
+    }
+
+    /// SNR that the nearest effect of the catalogue leaves, the true one aside.
+    fn nearest(&self) -> f64 {
+        let others = self.left.iter().filter(|(id, _)| *id != self.parts[0].0);
+        others.map(|(_, left)| *left).fold(f64::INFINITY, f64::min)
     }
 
     fn confusable(&self) -> Vec<&'static str> {
