@@ -23,6 +23,9 @@ pub mod recorder;
 pub mod trajectory;
 pub mod truth;
 
+#[cfg(test)]
+mod flight_tests;
+
 pub use faults::Fault;
 pub use flight::{Flight, Second, Sent};
 pub use mission::{Mission, MissionConfig};
