@@ -193,9 +193,9 @@ mod tests {
         for seconds in [3.7, 1234.5, 20_004.1] {
             let expected = propagate(&start, seconds, 1.0, J2).unwrap();
             let found = trajectory.state(f64::from(config.start_clock_s) + seconds);
-            // The propagations themselves part by millimetres for their steps of 1 and 10 s.
-            assert!((found.r_m - expected.r_m).norm() < 0.05, "{}", (found.r_m - expected.r_m).norm());
-            assert!((found.v_m_s - expected.v_m_s).norm() < 1e-4);
+            // The propagations themselves part by centimetres an orbit for their steps of 1 and 10 s.
+            assert!((found.r_m - expected.r_m).norm() < 0.2, "{}", (found.r_m - expected.r_m).norm());
+            assert!((found.v_m_s - expected.v_m_s).norm() < 3e-4);
         }
     }
 
