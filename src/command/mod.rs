@@ -5,6 +5,7 @@ pub mod challenge;
 use std::process::ExitCode;
 
 pub mod process;
+pub mod simulate;
 
 /// Done.
 pub const DONE: ExitCode = ExitCode::SUCCESS;
