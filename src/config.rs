@@ -54,8 +54,10 @@ pub struct HttpConfig {
     pub insecure: bool,
     /// WebSocket clients at once.
     pub live_clients_max: usize,
-    /// Messages of a topic kept for readers; one that falls further behind is told what it missed.
+    /// Messages of a topic kept in memory for readers; older ones are read again from what they refer to.
     pub live_queue_messages: usize,
+    /// A reader further behind than this many messages is told what it missed.
+    pub live_behind_messages: usize,
 }
 
 /// One thing wrong with a configuration.
@@ -219,6 +221,7 @@ fn http(section: &mut Section<'_>) -> HttpConfig {
         insecure: section.flag("insecure", false),
         live_clients_max: section.integer("live_clients_max", 1024, 1..=100_000) as usize,
         live_queue_messages: section.integer("live_queue_messages", 16_384, 16..=1 << 20) as usize,
+        live_behind_messages: section.integer("live_behind_messages", 1 << 20, 16..=1 << 32) as usize,
     }
 }
 

@@ -51,6 +51,11 @@ impl Topics {
         Topics(self.0 | 1 << topic as u8)
     }
 
+    /// This choice but for one topic.
+    pub const fn without(self, topic: Topic) -> Topics {
+        Topics(self.0 & !(1 << topic as u8))
+    }
+
     /// Whether a topic is chosen.
     pub const fn has(self, topic: Topic) -> bool {
         self.0 & (1 << topic as u8) != 0

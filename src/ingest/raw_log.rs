@@ -7,9 +7,10 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, RwLock};
 
-use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
+use redb::{Database, ReadableDatabase, TableDefinition};
 use sha2::{Digest, Sha256};
 
 use super::batch::{self, Stored};
@@ -98,6 +99,8 @@ pub struct RawLog {
     prefix: Vec<u8>,
     /// None while the file is being opened again after a fault.
     database: RwLock<Option<Database>>,
+    /// Batches in the log.
+    batches: AtomicU64,
     known: Mutex<HashMap<(FrameId, Digest16), Place>>,
     /// Batches read last, for references.
     recent: Mutex<Vec<(u64, std::sync::Arc<Vec<u8>>)>>,
@@ -118,6 +121,7 @@ impl RawLog {
             path,
             prefix,
             database: RwLock::new(Some(database)),
+            batches: AtomicU64::new(0),
             known: Mutex::default(),
             recent: Mutex::default(),
         })
@@ -162,6 +166,9 @@ impl RawLog {
             }
         }
         let stored = self.with_database(|database| self.commit(database, number, &octets, &fresh, journal));
+        if stored.is_ok() && !entries.is_empty() {
+            self.batches.store(number + 1, Ordering::Release);
+        }
         if stored.is_err() {
             fresh.iter().for_each(|(key, _)| drop(known.remove(key)));
         }
@@ -232,6 +239,7 @@ impl RawLog {
             }
             hand_on(number, entries);
             number += 1;
+            self.batches.fetch_max(number, Ordering::Release);
         }
         Ok(())
     }
@@ -247,6 +255,11 @@ impl RawLog {
             _ => None,
         });
         Ok(arrivals.collect())
+    }
+
+    /// Batches known to be durable.
+    pub fn batches(&self) -> u64 {
+        self.batches.load(Ordering::Acquire)
     }
 
     fn batch_octets(&self, number: u64) -> Result<Option<Vec<u8>>, StoreError> {

@@ -18,7 +18,7 @@ use crate::hub::wire::{AnomalyWire, EventWire, Gap, members};
 use crate::hub::{Body, Hub, Journaled, SampleSource, Topic, journal};
 use crate::ingest::wire::playback::PlaybackPart;
 use crate::pipeline::files::version_json;
-use crate::pipeline::{Change, PlaybackId, Station};
+use crate::pipeline::{Change, PlaybackId, Settings, Station};
 use crate::telemetry::AccRecord;
 use crate::units::Clock;
 
@@ -316,6 +316,21 @@ impl Writer {
     }
 }
 
+/// A station over a whole log, with nobody to tell.
+///
+/// # Errors
+/// When the log cannot be read.
+pub fn rebuild(log: &RawLog, settings: &Settings) -> Result<Station, StoreError> {
+    let mut station = Station::new(settings.clone(), None);
+    log.replay(|_, batch| take_into(&mut station, &batch))?;
+    if let Some(set_aside) = station.to_set_aside() {
+        station = Station::without(settings.clone(), None, set_aside);
+        log.replay(|_, batch| take_into(&mut station, &batch))?;
+    }
+    station.flush();
+    Ok(station)
+}
+
 fn take_into(station: &mut Station, batch: &[Entry]) {
     for entry in batch {
         match entry {
@@ -367,6 +382,7 @@ fn picture(station: &Station) -> Picture {
         playbacks_open: ledger.playbacks().filter(|(_, playback)| !playback.closed).count() as u64,
         seconds_covered: ledger.seconds.len(),
         gaps: station.gaps(),
+        latest_clock_s: latest,
         calibration: station.calibration().map_or(0, |calibration| calibration.version),
         events: station.events().count() as u64,
         anomalies: station.derived().anomalies.len() as u64,
