@@ -2,6 +2,7 @@
 
 mod layering;
 mod samples;
+mod station;
 
 use std::path::{Path, PathBuf};
 
