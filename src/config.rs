@@ -151,17 +151,19 @@ fn settings(root: &mut Section<'_>) -> Settings {
     root.section("mission", |section| {
         if let Some(name) = section.text("name") {
             let fits = !name.is_empty() && name.len() <= 64 && !name.contains('\0');
-            section.check("name", fits, || format!("{name:?} has {} octets; a mission has a name of 1 to 64", name.len()));
+            section
+                .check("name", fits, || format!("{name:?} has {} octets; a mission has a name of 1 to 64", name.len()));
             settings.mission = name;
         }
         if let Some(epoch) = section.text("epoch_utc") {
             match epoch.parse() {
                 Ok(epoch) => settings.time.epoch_utc = epoch,
-                Err(_) => section.fault("epoch_utc", format!("{epoch:?} is no RFC 3339 time, such as 1994-07-08T12:53:01Z")),
+                Err(_) => {
+                    section.fault("epoch_utc", format!("{epoch:?} is no RFC 3339 time, such as 1994-07-08T12:53:01Z"))
+                }
             }
         }
-        settings.time.liftoff_clock_s =
-            section.number("liftoff_clock_s", settings.time.liftoff_clock_s, 0.0..=4.0e9);
+        settings.time.liftoff_clock_s = section.number("liftoff_clock_s", settings.time.liftoff_clock_s, 0.0..=4.0e9);
     });
     settings.link = root.section("link", |section| {
         let standard = LinkConfig::default();
@@ -198,7 +200,8 @@ fn settings(root: &mut Section<'_>) -> Settings {
 
 fn ingest(section: &mut Section<'_>) -> IngestConfig {
     IngestConfig {
-        address: section.parsed("address", "an address and port, such as 127.0.0.1:7650")
+        address: section
+            .parsed("address", "an address and port, such as 127.0.0.1:7650")
             .unwrap_or(SocketAddr::from(([127, 0, 0, 1], 7650))),
         allow: section.parsed_list("allow", "an IP address"),
         connections_max: section.integer("connections_max", 16, 1..=4096) as usize,
@@ -212,10 +215,13 @@ fn http(section: &mut Section<'_>) -> HttpConfig {
     if let Some(token) = &token {
         let fits = token.len() >= 16 && token.bytes().all(|octet| octet.is_ascii_graphic());
         let length = token.len();
-        section.check("token", fits, || format!("it has {length} octets; a token has 16 or more, printable ASCII without spaces"));
+        section.check("token", fits, || {
+            format!("it has {length} octets; a token has 16 or more, printable ASCII without spaces")
+        });
     }
     HttpConfig {
-        address: section.parsed("address", "an address and port, such as 127.0.0.1:8080")
+        address: section
+            .parsed("address", "an address and port, such as 127.0.0.1:8080")
             .unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8080))),
         token,
         insecure: section.flag("insecure", false),

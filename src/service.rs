@@ -203,7 +203,8 @@ fn start_recording(
     board: &Arc<Board>,
 ) -> Result<(CancellationToken, JoinHandle<Result<(), RecordError>>), ServiceError> {
     let finish = CancellationToken::new();
-    let recorder = recorder::Recorder::start(&config.data_dir, &config.settings, log.clone(), hub.clone(), board.clone())?;
+    let recorder =
+        recorder::Recorder::start(&config.data_dir, &config.settings, log.clone(), hub.clone(), board.clone())?;
     let (runtime, finished) = (tokio::runtime::Handle::current(), finish.clone());
     Ok((finish, tokio::task::spawn_blocking(move || recorder.run(&runtime, &finished))))
 }

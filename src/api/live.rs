@@ -62,7 +62,9 @@ pub async fn live(
     let from = match wish.from.as_deref() {
         None | Some("now" | "") => From::Now,
         Some(text) => match text.strip_prefix("seq:") {
-            Some(seq) => From::Seq(seq.parse().map_err(|_| Problem::bad_request(format!("from is {text:?}; seq:N has a whole number")))?),
+            Some(seq) => From::Seq(
+                seq.parse().map_err(|_| Problem::bad_request(format!("from is {text:?}; seq:N has a whole number")))?,
+            ),
             None => From::Clock(clock(&app.mission, "from", text)?),
         },
     };
@@ -74,7 +76,10 @@ pub async fn live(
     }
     let upgrade = upgrade.map_err(|rejection| Problem::bad_request(rejection.to_string()))?;
     let permit = app.live_permits.clone().try_acquire_owned().map_err(|_| {
-        Problem::new(StatusCode::SERVICE_UNAVAILABLE, "as many WebSocket clients as are allowed (http.live_clients_max) are connected")
+        Problem::new(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "as many WebSocket clients as are allowed (http.live_clients_max) are connected",
+        )
     })?;
     Ok(upgrade.max_message_size(CLIENT_MESSAGE_OCTETS_MAX).on_upgrade(move |socket| async move {
         let counters = &app.board.counters;

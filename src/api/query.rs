@@ -18,7 +18,8 @@ pub fn clock(mission: &MissionTime, name: &str, text: &str) -> Result<Clock, Pro
         Err(_) => match text.parse::<Timestamp>() {
             Ok(utc) => mission.clock_s(utc),
             Err(_) => {
-                let detail = format!("{name} is {text:?}; a time is clock seconds (13800.5) or RFC 3339 (1994-07-08T16:43:01Z)");
+                let detail =
+                    format!("{name} is {text:?}; a time is clock seconds (13800.5) or RFC 3339 (1994-07-08T16:43:01Z)");
                 return Err(Problem::bad_request(detail));
             }
         },

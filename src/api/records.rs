@@ -54,7 +54,8 @@ pub async fn calibration_history(
 ) -> Result<Json<Value>, Problem> {
     let as_of = optional_clock(&app.mission, "as_of", query.as_of.as_deref())?;
     let versions = ask(&app, move |station| {
-        let known = station.derived().timeline.iter().filter(|version| as_of.is_none_or(|at| version.known_since <= at));
+        let known =
+            station.derived().timeline.iter().filter(|version| as_of.is_none_or(|at| version.known_since <= at));
         known.map(version_json).collect::<Vec<_>>()
     })
     .await;

@@ -192,7 +192,13 @@ mod tests {
     #[test]
     fn an_entry_is_read_as_it_was_written() {
         let entries = [
-            Entry::Windows { first_seq: 5, count: 7, first_start: Clock::from_tenths(250), step_tenths: -250, supersedes: true },
+            Entry::Windows {
+                first_seq: 5,
+                count: 7,
+                first_start: Clock::from_tenths(250),
+                step_tenths: -250,
+                supersedes: true,
+            },
             Entry::Seconds { first_seq: 12, count: 9, first_clock: Clock::from_tenths(30), step_tenths: 10 },
             Entry::Told { seq: 21, topic: Topic::Event, clock: Clock::from_tenths(1), json: "\"a\":1".into() },
         ];
@@ -205,7 +211,8 @@ mod tests {
     #[test]
     fn windows_in_step_share_an_entry() {
         let start = |n: i64| Clock::from_tenths(n * 250);
-        let mut run = Entry::Windows { first_seq: 1, count: 1, first_start: start(4), step_tenths: 0, supersedes: false };
+        let mut run =
+            Entry::Windows { first_seq: 1, count: 1, first_start: start(4), step_tenths: 0, supersedes: false };
         assert!(run.continue_with_window(2, start(5), false));
         assert!(run.continue_with_window(3, start(6), false));
         assert!(!run.continue_with_window(4, start(8), false), "out of step");

@@ -301,4 +301,3 @@ pub fn message_members<'a>(mission: &MissionTime, message: &'a Message) -> &'a [
         text.into()
     })
 }
-

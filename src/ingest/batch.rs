@@ -190,7 +190,9 @@ mod tests {
         let place = Place { batch: 3, offset: 44 };
         let mut repeat = Vec::new();
         assert_eq!(write(&mut repeat, &good, Some(place)), None);
-        assert!(matches!(&read(&repeat).unwrap()[..], [Stored::Repeat { playback: 7, place: found, .. }] if *found == place));
+        assert!(
+            matches!(&read(&repeat).unwrap()[..], [Stored::Repeat { playback: 7, place: found, .. }] if *found == place)
+        );
     }
 
     #[test]

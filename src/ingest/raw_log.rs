@@ -170,7 +170,9 @@ impl RawLog {
             self.batches.store(number + 1, Ordering::Release);
         }
         if stored.is_err() {
-            fresh.iter().for_each(|(key, _)| drop(known.remove(key)));
+            for (key, _) in &fresh {
+                known.remove(key);
+            }
         }
         stored
     }
@@ -228,8 +230,10 @@ impl RawLog {
         while let Some(stored) = self.stored_batch(number)? {
             let mut entries = Vec::new();
             for stored in stored {
-                if let Stored::Entry(Entry::Arrival { arrival: Arrival { verdict: Verdict::Good(id), octets, .. }, .. }, offset) =
-                    &stored
+                if let Stored::Entry(
+                    Entry::Arrival { arrival: Arrival { verdict: Verdict::Good(id), octets, .. }, .. },
+                    offset,
+                ) = &stored
                 {
                     let digest = Sha256::digest(octets)[..16].try_into().expect("a digest has 32 octets");
                     let place = Place { batch: number, offset: *offset };
@@ -277,9 +281,9 @@ impl RawLog {
     fn stored_batch(&self, number: u64) -> Result<Option<Vec<Stored>>, StoreError> {
         match self.batch_octets(number)? {
             None => Ok(None),
-            Some(octets) => batch::read(&octets)
-                .map(Some)
-                .map_err(|(offset, found)| StoreError::Damaged { number, offset, found }),
+            Some(octets) => {
+                batch::read(&octets).map(Some).map_err(|(offset, found)| StoreError::Damaged { number, offset, found })
+            }
         }
     }
 

@@ -133,7 +133,12 @@ impl Writer {
     ///
     /// # Errors
     /// When the store refused to the end; what it refused was counted nowhere.
-    pub fn run(mut self, runtime: &Handle, mut parts: mpsc::Receiver<Parts>, give_up: &CancellationToken) -> Result<(), StoreError> {
+    pub fn run(
+        mut self,
+        runtime: &Handle,
+        mut parts: mpsc::Receiver<Parts>,
+        give_up: &CancellationToken,
+    ) -> Result<(), StoreError> {
         let mut last_arrival = Instant::now();
         loop {
             let received = runtime.block_on(async { tokio::time::timeout(TICK, parts.recv()).await });
@@ -213,7 +218,12 @@ impl Writer {
         Ok(())
     }
 
-    fn write_until_durable(&mut self, batch: &[Entry], runtime: &Handle, give_up: &CancellationToken) -> Result<(), StoreError> {
+    fn write_until_durable(
+        &mut self,
+        batch: &[Entry],
+        runtime: &Handle,
+        give_up: &CancellationToken,
+    ) -> Result<(), StoreError> {
         let mut stuck = false;
         loop {
             let error = match self.write(batch) {
@@ -354,9 +364,7 @@ fn body(hub: &Hub, station: &Station, change: Change) -> Option<Body> {
         Change::Raw(record) => Some(Body::Second(record)),
         Change::Gap { from, to } => told(Topic::Window, from, members("gap", &Gap::new(&mission, from, to))),
         Change::Event(event) => told(Topic::Event, event.clock, members("event", &EventWire::new(&mission, &event))),
-        Change::Anomaly(anomaly) => {
-            told(Topic::Anomaly, anomaly.from, members("anomaly", &AnomalyWire::new(&anomaly)))
-        }
+        Change::Anomaly(anomaly) => told(Topic::Anomaly, anomaly.from, members("anomaly", &AnomalyWire::new(&anomaly))),
         Change::Calibration { known_since, .. } => {
             let json = station.calibration().map(version_json)?;
             told(Topic::Calibration, known_since, members("calibration", &json))
@@ -399,8 +407,12 @@ fn next_playback(entry: &Entry) -> u32 {
 /// Keeps the playbacks that a crash left open: from which bit of their stream to which.
 fn note_open(open: &mut HashMap<u32, (u64, u64)>, entry: &Entry) {
     match entry {
-        Entry::Opened { playback } => drop(open.insert(*playback, (0, 0))),
-        Entry::Closed { playback, .. } => drop(open.remove(playback)),
+        Entry::Opened { playback } => {
+            open.insert(*playback, (0, 0));
+        }
+        Entry::Closed { playback, .. } => {
+            open.remove(playback);
+        }
         Entry::Arrival { playback, arrival } => {
             let end_bit = arrival.first_bit + arrival.octets.len() as u64 * 8;
             let span = open.entry(*playback).or_insert((arrival.first_bit, end_bit));

@@ -44,7 +44,8 @@ pub fn dump(octets: &[u8]) -> Result<Vec<u8>, RecordError> {
             continue;
         }
         let refuse = |found: String| RecordError::Frame { topic: FRAME_TOPIC, sequence: message.sequence, found };
-        let frame: FrameMessage<'_> = serde_json::from_slice(&message.data).map_err(|error| refuse(error.to_string()))?;
+        let frame: FrameMessage<'_> =
+            serde_json::from_slice(&message.data).map_err(|error| refuse(error.to_string()))?;
         let octets = STANDARD.decode(frame.octets.as_bytes()).map_err(|error| refuse(error.to_string()))?;
         frames += 1;
         if frame.verdict != "truncated" {

@@ -165,9 +165,7 @@ impl Recorder {
         let file = recording.finish().map_err(self.write_failed())?;
         let path = self.directory.join(name(from, self.at));
         let finished = file.into_inner().map_err(|error| error.into_error()).and_then(|file| file.sync_all());
-        finished
-            .and_then(|()| fs::rename(&part, &path))
-            .map_err(|source| RecordError::File { path: part, source })
+        finished.and_then(|()| fs::rename(&part, &path)).map_err(|source| RecordError::File { path: part, source })
     }
 }
 

@@ -26,8 +26,20 @@ async fn every_named_route_answers_and_is_described() {
     running.wait_for_playbacks(1).await;
     let openapi = running.get("/openapi.json").await;
     let named = [
-        "/accel", "/accel/history", "/accel/live", "/calibration", "/calibration/history", "/gaps", "/playbacks", "/events",
-        "/anomalies", "/diagnosis", "/status", "/healthz", "/readyz", "/metrics",
+        "/accel",
+        "/accel/history",
+        "/accel/live",
+        "/calibration",
+        "/calibration/history",
+        "/gaps",
+        "/playbacks",
+        "/events",
+        "/anomalies",
+        "/diagnosis",
+        "/status",
+        "/healthz",
+        "/readyz",
+        "/metrics",
     ];
     for path in named {
         assert!(openapi["paths"][path]["get"].is_object(), "{path} is not described");

@@ -18,7 +18,8 @@ async fn assert_the_next_sender_is_served(running: &Running) {
     let before = running.get("/status").await;
     running.send(&dump(90_000, 120, 900_000)).await;
     let covered = before["ingest"]["seconds_covered"].as_u64().unwrap() + 120;
-    let status = running.wait_for("good telemetry taken", |status| status["ingest"]["seconds_covered"] == covered).await;
+    let status =
+        running.wait_for("good telemetry taken", |status| status["ingest"]["seconds_covered"] == covered).await;
     assert_sums_close(&status);
 }
 
@@ -67,7 +68,10 @@ async fn half_a_frame_and_silence_is_counted_and_the_connection_closed() {
     let closed = tokio::time::timeout(PATIENCE, stream.read(&mut [0u8; 16])).await.expect("closed in time");
     assert!(matches!(closed, Ok(0) | Err(_)), "the listener never writes");
     let status = running.wait_for_playbacks(1).await;
-    assert_eq!((&status["ingest"]["frames_new"], &status["ingest"]["frames_refused"]["truncated"]), (&1.into(), &1.into()));
+    assert_eq!(
+        (&status["ingest"]["frames_new"], &status["ingest"]["frames_refused"]["truncated"]),
+        (&1.into(), &1.into())
+    );
     assert_the_next_sender_is_served(&running).await;
 }
 
@@ -102,11 +106,13 @@ async fn frames_of_another_length_do_not_check() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_packet_of_an_unknown_apid_is_counted_and_the_next_one_read() {
     let running = start().await;
-    let strange = packet::write(packet::PacketId { apid: Apid(0x123), clock: science(20_300).clock, sequence: 9 }, &[7; 40]);
+    let strange =
+        packet::write(packet::PacketId { apid: Apid(0x123), clock: science(20_300).clock, sequence: 9 }, &[7; 40]);
     running.send(&dump_with(20_300, strange)).await;
     let status = running.wait_for_playbacks(1).await;
     assert_eq!(status["ingest"]["seconds_covered"], 599);
-    let refused: u64 = status["ingest"]["packets_refused"].as_object().unwrap().values().map(|n| n.as_u64().unwrap()).sum();
+    let refused: u64 =
+        status["ingest"]["packets_refused"].as_object().unwrap().values().map(|n| n.as_u64().unwrap()).sum();
     assert_eq!(refused, 1, "{status}");
     assert_the_next_sender_is_served(&running).await;
 }
@@ -153,7 +159,8 @@ struct SmallDisk(std::path::PathBuf);
 impl SmallDisk {
     fn mount(at: &Path, size: &str) -> Option<Self> {
         std::fs::create_dir_all(at).ok()?;
-        let mounted = Command::new("mount").args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"]).arg(at).output();
+        let mounted =
+            Command::new("mount").args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"]).arg(at).output();
         match mounted {
             Ok(output) if output.status.success() => Some(Self(at.into())),
             _ => {
@@ -193,7 +200,8 @@ async fn a_full_disk_stops_the_taking_and_loses_nothing() {
     std::fs::remove_file(&filler).unwrap();
     drop(Command::new("mount").args(["-o", "remount,size=200m"]).arg(&disk.0).output());
     sender.await.unwrap();
-    let status = running.wait_for("everything taken after all", |status| status["ingest"]["seconds_covered"] == 64_000).await;
+    let status =
+        running.wait_for("everything taken after all", |status| status["ingest"]["seconds_covered"] == 64_000).await;
     assert_eq!(status["phase"], "running");
     assert_sums_close(&status);
     running.service.drain().await.unwrap();
@@ -215,7 +223,11 @@ async fn a_busy_port_is_told_with_its_address() {
 fn a_bad_configuration_is_told_whole_with_exit_code_2() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("bad.toml");
-    std::fs::write(&path, "[link]\nframe_octets = 9000\n[http]\naddress = \"0.0.0.0:1\"\nport = 80\n[ingest]\nallow = 3\n").unwrap();
+    std::fs::write(
+        &path,
+        "[link]\nframe_octets = 9000\n[http]\naddress = \"0.0.0.0:1\"\nport = 80\n[ingest]\nallow = 3\n",
+    )
+    .unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_oare")).args(["serve", "--config"]).arg(&path).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     let told = String::from_utf8(output.stderr).unwrap();
@@ -250,6 +262,9 @@ fn every_configuration_file_is_read_and_the_standard_one_says_the_defaults() {
     let standard = Config::from_toml(&std::fs::read_to_string(folder.join("sts-65.toml")).unwrap()).unwrap();
     let defaults = Config::standard();
     assert_eq!(standard.settings, defaults.settings);
-    assert_eq!(format!("{:?}{:?}", standard.ingest, standard.http), format!("{:?}{:?}", defaults.ingest, defaults.http));
+    assert_eq!(
+        format!("{:?}{:?}", standard.ingest, standard.http),
+        format!("{:?}{:?}", defaults.ingest, defaults.http)
+    );
     Config::from_toml(&std::fs::read_to_string(folder.join("container.toml")).unwrap()).unwrap();
 }

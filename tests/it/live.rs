@@ -66,7 +66,9 @@ async fn numbers_last_over_restarts_and_old_messages_can_be_had_again() {
     running.send(&dump(21_200, 600, 2000)).await;
     let next = running.wait_for_playbacks(2).await["live"]["head_seq"].as_u64().unwrap();
     assert!(next > head);
-    let more = live.through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window,raw").unwrap(), next)).await;
+    let more = live
+        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window,raw").unwrap(), next))
+        .await;
     assert_eq!(more[0]["prev"].as_u64(), again.last().unwrap()["seq"].as_u64(), "the chain goes on after the restart");
 }
 
@@ -80,7 +82,9 @@ async fn history_goes_over_into_live_without_a_hole_or_a_repeat() {
     // More arrives while the history is on its way.
     running.send(&dump(23_000, 3000, 5000)).await;
     let head = running.wait_for_playbacks(2).await["live"]["head_seq"].as_u64().unwrap();
-    let messages = live.through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), head)).await;
+    let messages = live
+        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), head))
+        .await;
     assert_chain(&messages);
     let windows = starts(&messages, "window");
     let distinct: BTreeSet<i64> = windows.iter().copied().collect();
@@ -94,7 +98,8 @@ async fn a_late_frame_supersedes_the_windows_it_touches_and_no_other() {
     let running = start().await;
     let whole = dump(20_000, 1000, 0);
     const CADU_OCTETS: usize = 1119;
-    let (before, late, after) = (&whole[..40 * CADU_OCTETS], &whole[40 * CADU_OCTETS..41 * CADU_OCTETS], &whole[41 * CADU_OCTETS..]);
+    let (before, late, after) =
+        (&whole[..40 * CADU_OCTETS], &whole[40 * CADU_OCTETS..41 * CADU_OCTETS], &whole[41 * CADU_OCTETS..]);
     running.send(&[before, after].concat()).await;
     let head = running.wait_for_playbacks(1).await["live"]["head_seq"].as_u64().unwrap();
     assert_eq!(running.get("/gaps").await["gaps"].as_array().unwrap().len(), 1);
@@ -102,7 +107,9 @@ async fn a_late_frame_supersedes_the_windows_it_touches_and_no_other() {
     live.next().await.unwrap();
     running.send(late).await;
     let last = running.wait_for_playbacks(2).await["live"]["head_seq"].as_u64().unwrap();
-    let messages = live.through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), last)).await;
+    let messages = live
+        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), last))
+        .await;
     assert!(last > head);
     let touched = starts(&messages, "supersede");
     assert!((1..=3).contains(&touched.len()), "{touched:?}");
@@ -129,10 +136,17 @@ async fn a_slow_reader_is_told_what_it_missed() {
     let lag = late.next().await.unwrap();
     assert_eq!(lag["type"], "lag", "{lag}");
     let head = status["live"]["head_seq"].as_u64().unwrap();
-    let messages = late.through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), head)).await;
+    let messages = late
+        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), head))
+        .await;
     assert_eq!(messages[0]["prev"], lag["seq"]);
     assert_chain(&messages);
-    let all = status["accel"]["windows"].as_u64().unwrap() + running.get("/gaps").await["gaps"].as_array().unwrap().len() as u64;
+    let all = status["accel"]["windows"].as_u64().unwrap()
+        + running.get("/gaps").await["gaps"].as_array().unwrap().len() as u64;
     let first_excluded = u64::from(starts(&messages, "window").len() as u64 + lag["count"].as_u64().unwrap() < all);
-    assert_eq!(messages.len() as u64 + lag["count"].as_u64().unwrap() + first_excluded, all, "told and missed are all there is");
+    assert_eq!(
+        messages.len() as u64 + lag["count"].as_u64().unwrap() + first_excluded,
+        all,
+        "told and missed are all there is"
+    );
 }

@@ -80,9 +80,8 @@ impl Running {
 
     /// Waits until so many playbacks are over and everything of them is published.
     pub async fn wait_for_playbacks(&self, playbacks: u64) -> Value {
-        let over = |status: &Value| {
-            status["ingest"]["playbacks"] == playbacks && status["ingest"]["playbacks_open"] == 0
-        };
+        let over =
+            |status: &Value| status["ingest"]["playbacks"] == playbacks && status["ingest"]["playbacks_open"] == 0;
         self.wait_for(&format!("{playbacks} playbacks over"), over).await;
         // The flush after the last batch.
         let mut before = self.get("/status").await;
@@ -168,7 +167,8 @@ impl Live {
 pub fn science(second: i64) -> AccRecord {
     let clock = Clock::from_tenths(second * 10);
     let value = |sample: usize, axis: usize| {
-        let mixed = (second as u64 * 1_000_003 + sample as u64 * 7_919 + axis as u64 * 104_729).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let mixed = (second as u64 * 1_000_003 + sample as u64 * 7_919 + axis as u64 * 104_729)
+            .wrapping_mul(0x9E37_79B9_7F4A_7C15);
         (mixed >> 56) as i16 - 128 + 1000 * (axis as i16 + 1)
     };
     AccRecord {

@@ -48,7 +48,9 @@ async fn the_service_and_the_pure_core_say_the_same_and_a_restart_changes_nothin
         assert!(octets > 0 || dump.is_empty());
     }
     let status = running.wait_for("every playback over", |status| {
-        status["ingest"]["connections_open"] == 0 && status["ingest"]["seconds_covered"] == 21_296 && status["ingest"]["playbacks_open"] == 0
+        status["ingest"]["connections_open"] == 0
+            && status["ingest"]["seconds_covered"] == 21_296
+            && status["ingest"]["playbacks_open"] == 0
     });
     status.await;
     tokio::time::sleep(Duration::from_millis(300)).await;
@@ -94,7 +96,12 @@ async fn a_recording_holds_every_frame_and_reads_back_to_the_same_products() {
     assert_eq!(paths.len(), 1, "{paths:?}");
     let octets = std::fs::read(&paths[0]).unwrap();
     let summary = mcap::Summary::read(&octets).unwrap().expect("an index");
-    assert!(summary.channels.values().all(|channel| channel.schema.as_ref().is_some_and(|schema| schema.encoding == "jsonschema")));
+    assert!(
+        summary
+            .channels
+            .values()
+            .all(|channel| channel.schema.as_ref().is_some_and(|schema| schema.encoding == "jsonschema"))
+    );
     assert_eq!(undisturbed(&[mcap_reader::dump(&octets).unwrap()]), products);
     read_with_python(&paths[0], &octets);
     // What follows goes into a file of its own.
@@ -131,7 +138,8 @@ print(json.dumps(counts))
     }
     assert!(output.status.success(), "{told}");
     let counts: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let frames = mcap::MessageStream::new(octets).unwrap().filter(|m| m.as_ref().unwrap().channel.topic == "/raw/frame").count();
+    let frames =
+        mcap::MessageStream::new(octets).unwrap().filter(|m| m.as_ref().unwrap().channel.topic == "/raw/frame").count();
     assert_eq!(counts["/raw/frame"], frames);
     assert!(counts["/accel/window"].as_u64() > Some(0));
 }
@@ -225,7 +233,9 @@ async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, seed: u64) {
     for dump in dumps {
         send(program.ingest, dump).await;
     }
-    program.wait_until(|status| status["ingest"]["playbacks_open"] == 0 && status["ingest"]["connections_open"] == 0).await;
+    program
+        .wait_until(|status| status["ingest"]["playbacks_open"] == 0 && status["ingest"]["connections_open"] == 0)
+        .await;
     program.kill();
     let settings = Config::standard().settings;
     let log = RawLog::open(dir.path(), &settings.mission, settings.link.spacecraft_id).unwrap();

@@ -1,7 +1,7 @@
 // The dashboard: history first, then live over the WebSocket. Everything shown comes from the service's own interface.
 "use strict";
 
-const WINDOW_S = 50, STEP_S = 25, POINTS_MAX = 20000, REFRESH_MS = 3000;
+const WINDOW_S = 50, STEP_S = 25, POINTS_MAX = 60000, REFRESH_MS = 3000;
 const token = new URLSearchParams(location.search).get("access_token");
 const withToken = (path) => token ? path + (path.includes("?") ? "&" : "?") + "access_token=" + encodeURIComponent(token) : path;
 const get = async (path) => {
@@ -211,7 +211,10 @@ function live() {
     if (message.type === "window" || message.type === "supersede") take(message);
     if (message.type === "lag") chip("link", `live, ${message.count} missed`, "wait");
   };
-  socket.onclose = () => { chip("link", "connection lost", "bad"); setTimeout(live, 1500); };
+  let opened = false;
+  socket.addEventListener("open", () => { opened = true; });
+  // A service that never had our last message is another one: begin anew.
+  socket.onclose = () => { if (!opened) lastSeq = null; chip("link", "connection lost", "bad"); setTimeout(live, 1500); };
 }
 
 addEventListener("resize", () => { plots.forEach((plot, n) => plot.setSize({ width: byId("plot-" + AXES[n][0]).clientWidth, height: 190 })); dirty = true; });
