@@ -281,3 +281,23 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     }
     lanes.iter().sum::<f64>() + tail
 }
+
+/// A record of noise alone: `normal` gives independent standard normal numbers.
+pub fn simulate(noise: &AxisNoise, schedule: &Schedule, activity: &[f64], mut normal: impl FnMut() -> f64) -> Vec<f64> {
+    let mut previous = noise.white_ng * normal();
+    let mut short = noise.short_ng * normal();
+    let mut slow = noise.slow_ng * normal();
+    (0..schedule.len())
+        .map(|i| {
+            let step = schedule.step_s[i];
+            let [f1, f2] = [(-step / noise.short_tau_s).exp(), (-step / noise.slow_tau_s).exp()];
+            short = f1 * short + (1.0 - f1 * f1).sqrt() * noise.short_ng * normal();
+            slow = f2 * slow + (1.0 - f2 * f2).sqrt() * noise.slow_ng * normal();
+            let own = noise.white_ng * normal();
+            let [a, b] = schedule.overlap[i];
+            let value = activity[i] * (a * own + b * previous + short) + slow;
+            previous = own;
+            value
+        })
+        .collect()
+}

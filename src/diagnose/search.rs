@@ -324,6 +324,9 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
             theta = refined;
         }
         let peak = peak.max(before);
+        if !peak.is_finite() {
+            continue;
+        }
         let (log_occam, sigma) = volume(&gain, &theta, &free, effect, entry.log_volume, peak);
         if let Some(point) = point_at(scene, frame, entry, &theta, None) {
             let m = &mut set.members[i];
@@ -337,6 +340,14 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
 fn volume(gain: &impl Fn(&Theta) -> f64, theta: &Theta, free: &[usize], effect: &Effect, log_volume: f64, peak: f64) -> (f64, Theta) {
     let n = free.len();
     let mut h: Vec<f64> = free.iter().map(|j| effect.nonlinear[*j].step * 0.1).collect();
+    // A wall on one side (a lag cannot be negative) is mirrored: the fall is counted on the open side.
+    let gain = |t: &Theta| {
+        let there = gain(t);
+        if there.is_finite() {
+            return there;
+        }
+        gain(&[2.0 * theta[0] - t[0], 2.0 * theta[1] - t[1]])
+    };
     // Steps at which the evidence falls by about one half: neither rounding nor the far side.
     for (a, j) in free.iter().enumerate() {
         for _ in 0..14 {
@@ -346,7 +357,7 @@ fn volume(gain: &impl Fn(&Theta) -> f64, theta: &Theta, free: &[usize], effect: 
                 gain(&t)
             };
             let drop = peak - 0.5 * (at(1.0) + at(-1.0));
-            if drop.is_nan() || drop.is_infinite() || drop > 1.5 {
+            if !drop.is_finite() || drop > 1.5 {
                 h[a] *= 0.6;
             } else if drop < 0.25 {
                 h[a] *= 1.5;
@@ -362,7 +373,7 @@ fn volume(gain: &impl Fn(&Theta) -> f64, theta: &Theta, free: &[usize], effect: 
     };
     let mut hessian = DMatrix::zeros(n, n);
     for a in 0..n {
-        hessian[(a, a)] = (2.0 * peak - at(&[(a, 1.0)]) - at(&[(a, -1.0)])).max(0.05) / (h[a] * h[a]);
+        hessian[(a, a)] = (2.0 * peak - at(&[(a, 1.0)]) - at(&[(a, -1.0)])).clamp(0.05, 1e6) / (h[a] * h[a]);
         for b in 0..a {
             let mixed = (at(&[(a, 1.0), (b, -1.0)]) + at(&[(a, -1.0), (b, 1.0)]) - at(&[(a, 1.0), (b, 1.0)]) - at(&[(a, -1.0), (b, -1.0)])) / (4.0 * h[a] * h[b]);
             let bound = 0.95 * (hessian[(a, a)] * hessian[(b, b)]).sqrt();

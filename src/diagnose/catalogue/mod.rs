@@ -152,10 +152,10 @@ pub fn no_volume(_: &Scene) -> f64 {
     0.0
 }
 
-/// Prior odds of an effect that is met as often as any other: one in twenty records.
-pub const COMMON: f64 = -3.0;
+/// Prior odds of an effect that is met as often as any other: about one in fifty records each.
+pub const COMMON: f64 = -4.0;
 /// Prior odds of one that is met less often.
-pub const RARE: f64 = -5.0;
+pub const RARE: f64 = -6.0;
 
 /// Three coefficients of a push fixed in the body.
 pub const fn push(size_ng: f64, size_max_ng: f64) -> [Linear; 3] {
