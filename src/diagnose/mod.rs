@@ -12,3 +12,4 @@ pub mod open_form;
 pub mod search;
 pub mod solve;
 mod optimise;
+pub mod report;
