@@ -18,6 +18,8 @@ struct Arguments {
 enum Command {
     /// Dumps in, product files out: the pipeline without sockets.
     Process(command::process::Args),
+    /// Says what physics a simulation left out, from a case directory.
+    Diagnose(command::diagnose::Args),
     /// Makes, seals, runs and scores concealed cases.
     Challenge(command::challenge::Args),
 }
@@ -25,6 +27,7 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Process(args) => command::process::run(args),
+        Command::Diagnose(args) => command::diagnose::run(args),
         Command::Challenge(args) => command::challenge::run(args),
     };
     done.unwrap_or_else(|error| {

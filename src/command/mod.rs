@@ -4,6 +4,7 @@ pub mod challenge;
 
 use std::process::ExitCode;
 
+pub mod diagnose;
 pub mod process;
 
 /// Done.
