@@ -1,6 +1,7 @@
 //! The commands of `oare`, one a file: arguments in, exit code out. The work is in the library.
 
 pub mod challenge;
+pub mod diagnose;
 pub mod export;
 pub mod process;
 pub mod replay;
