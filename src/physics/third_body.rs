@@ -17,6 +17,8 @@ pub const SUN_RADIUS_M: f64 = 6.957e8;
 pub const EARTH_RADIUS_M: f64 = 6_378_137.0;
 /// Radius of the Moon, m.
 pub const MOON_RADIUS_M: f64 = 1_737_400.0;
+/// Love number of the solid Earth, degree 2 (IERS Conventions 2010, nominal).
+const LOVE_K2: f64 = 0.30;
 const AU_M: f64 = 149_597_870_700.0;
 const TABLE_STEP_S: f64 = 3_600.0;
 const TABLE_MARGIN: usize = 4;
@@ -74,6 +76,16 @@ impl SunMoonTable {
 pub fn third_body_acceleration(r_m: &Vector3<f64>, body_m: &Vector3<f64>, gm_m3_s2: f64) -> Vector3<f64> {
     let to_body = body_m - r_m;
     (to_body / to_body.norm().powi(3) - body_m / body_m.norm().powi(3)) * gm_m3_s2
+}
+
+/// Pull of the tide that a distant body raises in the solid Earth, m/s^2 (Montenbruck and Gill 2000, section 3.7.2,
+/// degree 2, no phase lag): a = (k2/2) (GM_b/d^3) (R^5/r^4) ((3 - 15 cos^2 c) r^ + 6 cos c b^).
+pub fn solid_tide_acceleration(r_m: &Vector3<f64>, body_m: &Vector3<f64>, gm_m3_s2: f64) -> Vector3<f64> {
+    let (r, d) = (r_m.norm(), body_m.norm());
+    let (r_unit, b_unit) = (r_m / r, body_m / d);
+    let cos = r_unit.dot(&b_unit);
+    let size = 0.5 * LOVE_K2 * gm_m3_s2 / d.powi(3) * EARTH_RADIUS_M.powi(5) / r.powi(4);
+    (r_unit * (3.0 - 15.0 * cos * cos) + b_unit * (6.0 * cos)) * size
 }
 
 /// The part of the Sun's disc that is seen past a sphere, 0 in full shadow and 1 in full light (Montenbruck and Gill
