@@ -4,7 +4,7 @@ use oare_ground::physics::{earth_orientation::EarthOrientation, gravity_field::G
 
 fn median(mut x: Vec<f64>) -> f64 {
     x.sort_by(f64::total_cmp);
-    x[x.len() / 2]
+    0.5 * (x[x.len() / 2] + x[(x.len() - 1) / 2])
 }
 
 #[test]

@@ -60,7 +60,7 @@ impl Arc {
     pub fn new(track: &Track, environment: &Environment, fit_s: f64) -> Result<Self, OrbitError> {
         let inertial = |(t, r): (&f64, &Vector3<f64>)| environment.rotation.to_inertial(*t, r);
         let observed_m: Vec<_> = track.t_s.iter().zip(&track.fixed_m).map(inertial).collect();
-        let fitted = track.t_s.partition_point(|t| *t < fit_s);
+        let fitted = track.t_s.partition_point(|t| *t <= fit_s);
         if fitted < 12 {
             return Err(OrbitError::TooFew { id: track.id.clone(), found: fitted, expected: 12 });
         }

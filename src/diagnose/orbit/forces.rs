@@ -14,6 +14,7 @@ use crate::physics::third_body::{
     sunlit_fraction, third_body_acceleration,
 };
 
+const LIGHT_M_S: f64 = 299_792_458.0;
 const EARTH_RATE_RAD_S: f64 = 7.292_115_9e-5;
 
 /// Where the satellites fly: everything that depends on time alone.
@@ -155,7 +156,8 @@ impl Moment {
     pub fn baseline(&self, environment: &Environment, baseline: &Baseline) -> Vector3<f64> {
         let fixed = environment.field.acceleration(&(self.rotation * self.state.r), baseline.degree);
         let known = |sum, term: &Term| sum + self.columns(environment, *term)[0];
-        baseline.known.iter().fold(self.rotation.tr_mul(&fixed), known)
+        let newton = self.rotation.tr_mul(&fixed) + self.relativity(environment.field.gm_m3_s2());
+        baseline.known.iter().fold(newton, known)
     }
 
     /// A term's acceleration for unit coefficients; unused columns are zero.
@@ -173,14 +175,23 @@ impl Moment {
             }
             Term::SolarRadiation => [to_sun * -self.sunlit, zero],
             Term::YBias => [panel_axis(r, &to_sun), zero],
-            Term::BBias => [to_sun.cross(&panel_axis(r, &to_sun)), zero],
+            Term::BBias => [to_sun.cross(&panel_axis(r, &to_sun)) * self.sunlit, zero],
             Term::OncePerRev => {
                 let b = to_sun.cross(&panel_axis(r, &to_sun));
                 let (sin, cos) = self.argument_of_latitude().sin_cos();
-                [b * cos, b * sin]
+                [b * cos * self.sunlit, b * sin * self.sunlit]
             }
             Term::Drag => [self.drag(), zero],
         }
+    }
+
+    /// The Earth's Schwarzschild term (IERS Conventions 2010, equation 10.12, first part), 3e-10 m/s^2 at a GPS orbit:
+    /// a = GM/(c^2 r^3) ((4 GM/r - v.v) r + 4 (r.v) v).
+    fn relativity(&self, gm: f64) -> Vector3<f64> {
+        let State { r, v } = &self.state;
+        let distance = r.norm();
+        let size = gm / (LIGHT_M_S * LIGHT_M_S * distance.powi(3));
+        (r * (4.0 * gm / distance - v.norm_squared()) + v * (4.0 * r.dot(v))) * size
     }
 
     fn argument_of_latitude(&self) -> f64 {
