@@ -83,6 +83,8 @@ pub enum Mode {
     Scale,
     /// Reentry.
     Reentry,
+    /// A code without a meaning.
+    Unknown,
 }
 
 impl Mode {
@@ -99,12 +101,12 @@ impl Mode {
 
     /// The three-bit code.
     pub const fn code(self) -> u8 {
-        self as u8 + 1
+        (self as u8 + 1) % 5
     }
 
-    /// `normal`, `bias`, `scale`, `reentry`.
+    /// `normal`, `bias`, `scale`, `reentry`; empty for a code without a meaning.
     pub const fn word(self) -> &'static str {
-        ["normal", "bias", "scale", "reentry"][self as usize]
+        ["normal", "bias", "scale", "reentry", ""][self as usize]
     }
 }
 

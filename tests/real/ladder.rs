@@ -16,7 +16,8 @@ fn ladder() {
     let eop = EarthOrientation::from_csv(&read("eop.csv")).unwrap();
     let field = GravityField::from_gfc(&read("../gravity/eigen-6s-degree12.gfc"), rec.origin.mjd + 1.0).unwrap();
     let env = Environment::new(rec.origin, rec.span_s(), &eop, field).unwrap();
-    use Term::*; let _lv = 0;
+    use Term::*;
+    let _lv = 0;
     let levels: Vec<(Baseline, Vec<Term>)> = vec![
         (Baseline { degree: 0, known: vec![], estimated: vec![] }, vec![]),
         (Baseline { degree: 8, known: vec![], estimated: vec![] }, vec![]),

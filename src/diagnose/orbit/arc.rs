@@ -162,52 +162,6 @@ impl Arc {
             }
         }
     }
-
-    /// Partials of every position with respect to a velocity step at `t_s` (columns: inertial x, y, z), from the
-    /// state's own partials: the change of the initial state that would have the same effect afterwards.
-    pub fn impulse_partials(
-        &self,
-        environment: &Environment,
-        baseline: &Baseline,
-        fit: &ArcFit,
-        epoch: usize,
-    ) -> DMatrix<f64> {
-        let flight = Flight { environment, baseline, gauss: Collocation::gauss(STAGES) };
-        let zero = State { r: Vector3::zeros(), v: Vector3::zeros() };
-        let mut carried = vec![zero; 3];
-        for (axis, column) in carried.iter_mut().enumerate() {
-            column.v[axis] = 1.0;
-        }
-        let mut out = DMatrix::zeros(3 * self.t_s.len(), 3);
-        let mut plain = fit.clone();
-        plain.columns.clear();
-        let (mut state, mut t) = (self.state_at(&flight, fit, epoch), self.t_s[epoch]);
-        for (i, &next) in self.t_s.iter().enumerate().skip(epoch + 1) {
-            let parts = ((next - t) / self.step_s).ceil().max(1.0);
-            let h = (next - t) / parts;
-            for part in 0..parts as usize {
-                state = flight.advance_columns(t + part as f64 * h, state, h, &plain, &mut carried);
-            }
-            t = next;
-            for (k, column) in carried.iter().enumerate() {
-                out.fixed_view_mut::<3, 1>(3 * i, k).copy_from(&column.r);
-            }
-        }
-        out
-    }
-
-    fn state_at(&self, flight: &Flight<'_>, fit: &ArcFit, epoch: usize) -> State {
-        let (mut state, mut t) = (fit.start, self.t_s[0]);
-        for &next in &self.t_s[1..=epoch] {
-            let parts = ((next - t) / self.step_s).ceil().max(1.0);
-            let h = (next - t) / parts;
-            for part in 0..parts as usize {
-                state = flight.step(t + part as f64 * h, state, h, &fit.coefficients).end;
-            }
-            t = next;
-        }
-        state
-    }
 }
 
 impl ArcFit {
@@ -272,15 +226,6 @@ impl Flight<'_> {
             (now, from) = (step.end, to);
         }
         now
-    }
-
-    fn advance_columns(&self, t_s: f64, state: State, h_s: f64, fit: &ArcFit, carried: &mut [State]) -> State {
-        let step = self.step(t_s, state, h_s, &fit.coefficients);
-        let gradient = self.gradients(&step);
-        for column in carried.iter_mut() {
-            *column = self.gauss.step_linear(h_s, *column, &gradient, &[Vector3::zeros(); STAGES]);
-        }
-        step.end
     }
 
     fn gradients(&self, step: &Step) -> Vec<nalgebra::Matrix3<f64>> {

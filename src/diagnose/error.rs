@@ -1,0 +1,123 @@
+//! What can be wrong with a case, in one sentence each, with the value and its place.
+
+/// Why a case cannot be analysed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CaseError {
+    /// `case.toml` does not parse.
+    #[error("case.toml: {0}")]
+    Toml(String),
+    /// A key is absent or of the wrong type.
+    #[error("case.toml: `{key}` must be {expected}, found {found}")]
+    Key {
+        /// Dotted key.
+        key: String,
+        /// What it must be.
+        expected: &'static str,
+        /// What it is.
+        found: String,
+    },
+    /// A file the case names was not given.
+    #[error("{file}: the case names this file, but it is not there")]
+    MissingFile {
+        /// Its name.
+        file: String,
+    },
+    /// A column is absent.
+    #[error("{file}: no column `{column}`; the header has: {found}")]
+    MissingColumn {
+        /// File.
+        file: String,
+        /// Column wanted.
+        column: String,
+        /// Header found.
+        found: String,
+    },
+    /// A cell is not a finite number.
+    #[error("{file}, line {line}: `{column}` must be a finite number, found `{found}`")]
+    NotANumber {
+        /// File.
+        file: String,
+        /// Line, the header being 1.
+        line: usize,
+        /// Column.
+        column: String,
+        /// Cell.
+        found: String,
+    },
+    /// A row has too few or too many cells, or the text is not CSV.
+    #[error("{file}: {reason}")]
+    Csv {
+        /// File.
+        file: String,
+        /// The reader's reason.
+        reason: String,
+    },
+    /// Times do not increase.
+    #[error("{file}, line {line}: clock_s must increase, found {found} after {before}")]
+    TimeOrder {
+        /// File.
+        file: String,
+        /// Line, the header being 1.
+        line: usize,
+        /// This time.
+        found: f64,
+        /// The one before.
+        before: f64,
+    },
+    /// Values cannot be in the unit the column promises.
+    #[error(
+        "{file}: `{column}` has a typical size of {found:.3e}, and {unit} between {low:.0e} and {high:.0e} is expected: is the unit right?"
+    )]
+    Unit {
+        /// File.
+        file: String,
+        /// Column.
+        column: String,
+        /// Median of absolute values.
+        found: f64,
+        /// Unit expected.
+        unit: &'static str,
+        /// Lowest credible.
+        low: f64,
+        /// Highest credible.
+        high: f64,
+    },
+    /// Too little to work with.
+    #[error("{file}: {found} rows, and at least {needed} are needed")]
+    TooFew {
+        /// File.
+        file: String,
+        /// Rows found.
+        found: usize,
+        /// Rows needed.
+        needed: usize,
+    },
+    /// Recording and simulation do not meet.
+    #[error(
+        "the recording ({recording_start_s} to {recording_end_s} s) and {file} ({start_s} to {end_s} s) have {common} windows in common, and at least {needed} are needed"
+    )]
+    NoOverlap {
+        /// First window.
+        recording_start_s: f64,
+        /// Last window.
+        recording_end_s: f64,
+        /// The other file.
+        file: String,
+        /// Its first instant.
+        start_s: f64,
+        /// Its last instant.
+        end_s: f64,
+        /// Windows in common.
+        common: usize,
+        /// Windows needed.
+        needed: usize,
+    },
+    /// A kind of recording this room does not take.
+    #[error(
+        "case.toml: recording.kind `{0}` is not one of acceleration_csv, recorder_dump, orbit_sp3, series_csv, static_poses"
+    )]
+    Kind(String),
+    /// The numbers defeat the estimation.
+    #[error("{0}")]
+    Numeric(String),
+}

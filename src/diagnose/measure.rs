@@ -1,0 +1,147 @@
+//! The recorder's view of anything: the mean over its 50 s window at the recorded instants.
+//!
+//! Everything compared with the recording passes through here: the simulation and every regressor alike. A mask is
+//! a window that is absent from `clock_s`; nothing is ever filled in.
+
+use super::case::HALF_WINDOW_S;
+
+/// Window means at given instants of a series on a given grid, the series being linear between its grid points.
+#[derive(Debug, Clone)]
+pub struct Measurement {
+    first: Vec<u32>,
+    start: Vec<u32>,
+    weight: Vec<f64>,
+}
+
+impl Measurement {
+    /// Weights of `grid` for windows centred on `clock_s` less `ahead_s`: a clock that runs ahead labels late.
+    pub fn new(grid: &[f64], clock_s: &[f64], ahead_s: f64) -> Self {
+        let mut measurement = Self { first: Vec::with_capacity(clock_s.len()), start: vec![0], weight: Vec::new() };
+        let mut cell = 0;
+        for &centre in clock_s {
+            let [low, high] = [centre - ahead_s - HALF_WINDOW_S, centre - ahead_s + HALF_WINDOW_S];
+            while cell > 0 && grid[cell] > low {
+                cell -= 1;
+            }
+            while cell + 2 < grid.len() && grid[cell + 1] <= low {
+                cell += 1;
+            }
+            measurement.push_window(grid, cell, low, high);
+        }
+        measurement
+    }
+
+    /// One window: the integrals of the hat functions over it. What lies beyond the grid takes the value at its edge.
+    fn push_window(&mut self, grid: &[f64], cell: usize, low: f64, high: f64) {
+        self.first.push(cell as u32);
+        let base = self.weight.len();
+        self.weight.push(0.0);
+        let width = high - low;
+        let mut j = cell;
+        loop {
+            let [left, right] = [grid[j], grid[j + 1]];
+            let from = if j == 0 { low } else { low.max(left) };
+            let to = if j + 2 == grid.len() { high } else { high.min(right) };
+            self.weight.push(0.0);
+            if to > from {
+                let at = ((0.5 * (from + to) - left) / (right - left)).clamp(0.0, 1.0);
+                let share = (to - from) / width;
+                self.weight[base + j - cell] += share * (1.0 - at);
+                self.weight[base + j - cell + 1] += share * at;
+            }
+            if right >= high || j + 2 >= grid.len() {
+                break;
+            }
+            j += 1;
+        }
+        self.start.push(self.weight.len() as u32);
+    }
+
+    /// Number of windows.
+    pub fn windows(&self) -> usize {
+        self.first.len()
+    }
+
+    /// Window means of `series`, given on the grid.
+    pub fn apply(&self, series: &[f64]) -> Vec<f64> {
+        (0..self.first.len())
+            .map(|i| {
+                let weights = &self.weight[self.start[i] as usize..self.start[i + 1] as usize];
+                let values = &series[self.first[i] as usize..];
+                weights.iter().zip(values).map(|(w, x)| w * x).sum()
+            })
+            .collect()
+    }
+
+    /// The same for the three axes.
+    pub fn apply3(&self, series: &[Vec<f64>; 3]) -> [Vec<f64>; 3] {
+        std::array::from_fn(|k| self.apply(&series[k]))
+    }
+}
+
+/// Share of each window that lies inside any of the spans; overlapping spans count each.
+pub fn coverage(clock_s: &[f64], spans: &[[f64; 2]]) -> Vec<f64> {
+    let mut share = vec![0.0; clock_s.len()];
+    for &[from, to] in spans {
+        let first = clock_s.partition_point(|t| t + HALF_WINDOW_S <= from);
+        for (i, t) in clock_s.iter().enumerate().skip(first) {
+            if t - HALF_WINDOW_S >= to {
+                break;
+            }
+            share[i] += ((t + HALF_WINDOW_S).min(to) - (t - HALF_WINDOW_S).max(from)).max(0.0) / (2.0 * HALF_WINDOW_S);
+        }
+    }
+    share
+}
+
+/// Window mean of a push that starts at `onset_s` and decays with `tau_s` (infinite: a step).
+pub fn decay(clock_s: &[f64], onset_s: f64, tau_s: f64) -> Vec<f64> {
+    clock_s
+        .iter()
+        .map(|t| {
+            let high = t + HALF_WINDOW_S - onset_s;
+            let low = (t - HALF_WINDOW_S - onset_s).max(0.0);
+            if high <= 0.0 {
+                0.0
+            } else if tau_s.is_infinite() {
+                (high - low) / (2.0 * HALF_WINDOW_S)
+            } else {
+                tau_s * ((-low / tau_s).exp() - (-high / tau_s).exp()) / (2.0 * HALF_WINDOW_S)
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_window_mean_of_a_line_is_its_value_at_the_centre_and_of_a_parabola_exceeds_it_as_the_trapezoid_does() {
+        let grid: Vec<f64> = (0..50).map(|i| 20.0 * i as f64).collect();
+        let clock = [100.0, 107.0, 400.0, 412.5];
+        let m = Measurement::new(&grid, &clock, 0.0);
+        let line: Vec<f64> = grid.iter().map(|t| 3.0 * t - 5.0).collect();
+        for (value, t) in m.apply(&line).iter().zip(clock) {
+            assert!((value - (3.0 * t - 5.0)).abs() < 1e-9, "{value} at {t}");
+        }
+        let ones = m.apply(&vec![1.0; 50]);
+        assert!(ones.iter().all(|w| (w - 1.0).abs() < 1e-12), "{ones:?}");
+    }
+
+    #[test]
+    fn a_clock_ahead_labels_late() {
+        let grid: Vec<f64> = (0..50).map(|i| 20.0 * i as f64).collect();
+        let m = Measurement::new(&grid, &[300.0], 40.0);
+        assert!((m.apply(&grid)[0] - 260.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_pulse_inside_the_window_counts_by_its_share() {
+        assert_eq!(coverage(&[100.0, 125.0, 150.0], &[[110.0, 130.0]]), vec![0.3, 0.4, 0.1]);
+        let step = decay(&[100.0, 125.0, 150.0], 125.0, f64::INFINITY);
+        assert_eq!(step, vec![0.0, 0.5, 1.0]);
+        let slow = decay(&[100.0, 125.0, 150.0], 125.0, 1e9);
+        assert!(step.iter().zip(slow).all(|(a, b)| (a - b).abs() < 1e-6));
+    }
+}

@@ -1,0 +1,273 @@
+//! The noise of the windows, and the filter that whitens it.
+//!
+//! Per axis three parts: white noise of the samples, seen through windows that overlap by half (a moving average, exactly
+//! as the stride has it), a short autoregression (tens of seconds to minutes), both following the crew's activity, and
+//! a slow autoregression (minutes to hours) that does not. The order was chosen so: one autoregression alone either
+//! misses the slow part or takes the overlap for it. State space, so that gaps are simply longer steps.
+//!
+//! The amplitude of the slow part is estimated on a logarithmic scale with a prior: it never reaches zero, and a
+//! record too short to exclude slow noise is treated as having some. That is what keeps false leaks away.
+
+use super::optimise::nelder_mead;
+
+/// Noise of one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisNoise {
+    /// White noise of a window, ng, at activity 1.
+    pub white_ng: f64,
+    /// Short autoregression, ng, at activity 1.
+    pub short_ng: f64,
+    /// Its correlation time.
+    pub short_tau_s: f64,
+    /// Slow autoregression, ng.
+    pub slow_ng: f64,
+    /// Its correlation time.
+    pub slow_tau_s: f64,
+}
+
+impl AxisNoise {
+    /// RMS of a window at activity 1.
+    pub fn rms_ng(&self) -> f64 {
+        (self.white_ng.powi(2) + self.short_ng.powi(2) + self.slow_ng.powi(2)).sqrt()
+    }
+}
+
+/// When the windows are and how active the crew was: what the noise depends on beside its parameters.
+#[derive(Debug, Clone)]
+pub struct Schedule {
+    /// Window centres.
+    pub clock_s: Vec<f64>,
+    /// Step to the window before, s; infinite for the first.
+    pub step_s: Vec<f64>,
+    /// Coefficients of the window's own and of the previous sample noise.
+    overlap: Vec<[f64; 2]>,
+}
+
+/// Window length, s: two windows closer than this share samples.
+const WINDOW_S: f64 = 50.0;
+
+impl Schedule {
+    /// From window centres.
+    pub fn new(clock_s: &[f64]) -> Self {
+        let mut step_s = vec![f64::INFINITY];
+        step_s.extend(clock_s.windows(2).map(|w| w[1] - w[0]));
+        let mut own = 1.0_f64;
+        let overlap = step_s
+            .iter()
+            .map(|step| {
+                let shared = (1.0 - step / WINDOW_S).max(0.0);
+                let previous = (shared / own).min(0.999);
+                own = (1.0 - previous * previous).sqrt();
+                [own, previous]
+            })
+            .collect();
+        Self { clock_s: clock_s.to_vec(), step_s, overlap }
+    }
+
+    /// Number of windows.
+    pub fn len(&self) -> usize {
+        self.clock_s.len()
+    }
+
+    /// No windows at all.
+    pub fn is_empty(&self) -> bool {
+        self.clock_s.is_empty()
+    }
+}
+
+/// Gains of the whitening filter, one row a window.
+#[derive(Debug, Clone, Copy)]
+struct Row {
+    h0: f64,
+    h1: f64,
+    per_sd: f64,
+    gain: [f64; 3],
+    decay: [f64; 2],
+}
+
+/// The whitening filter of one axis: linear, the same for data and for every regressor.
+#[derive(Debug, Clone)]
+pub struct Whitener {
+    rows: Vec<Row>,
+    log_det: f64,
+}
+
+impl Whitener {
+    /// From the noise, the windows and the activity of each.
+    pub fn new(noise: &AxisNoise, schedule: &Schedule, activity: &[f64]) -> Self {
+        let [vw, v1, v2] = [noise.white_ng.powi(2), noise.short_ng.powi(2), noise.slow_ng.powi(2)];
+        let mut rows = Vec::with_capacity(schedule.len());
+        let mut log_det = 0.0;
+        // Covariance of (previous sample noise, short, slow) before the window.
+        let (mut p00, mut p01, mut p02, mut p11, mut p12, mut p22) = (vw, 0.0, 0.0, v1, 0.0, v2);
+        let (mut f1, mut f2, mut step_before) = (0.0, 0.0, f64::NAN);
+        for i in 0..schedule.len() {
+            let [own, previous] = schedule.overlap[i];
+            let (s, step) = (activity[i], schedule.step_s[i]);
+            if step != step_before {
+                (f1, f2, step_before) = ((-step / noise.short_tau_s).exp(), (-step / noise.slow_tau_s).exp(), step);
+            }
+            p01 *= f1;
+            p02 *= f2;
+            p11 = f1 * f1 * (p11 - v1) + v1;
+            p12 *= f1 * f2;
+            p22 = f2 * f2 * (p22 - v2) + v2;
+            let (h0, h1) = (s * previous, s);
+            let [c0, c1, c2] = [h0 * p00 + h1 * p01 + p02, h0 * p01 + h1 * p11 + p12, h0 * p02 + h1 * p12 + p22];
+            let ce = s * own * vw;
+            let variance = h0 * c0 + h1 * c1 + c2 + s * own * ce;
+            let inverse = 1.0 / variance;
+            let gain = [ce * inverse, c1 * inverse, c2 * inverse];
+            p00 = vw - ce * gain[0];
+            p01 = -ce * gain[1];
+            p02 = -ce * gain[2];
+            p11 -= c1 * gain[1];
+            p12 -= c1 * gain[2];
+            p22 -= c2 * gain[2];
+            log_det += variance.ln();
+            rows.push(Row { h0, h1, per_sd: inverse.sqrt(), gain, decay: [f1, f2] });
+        }
+        Self { rows, log_det }
+    }
+
+    /// Log determinant of the covariance.
+    pub fn log_det(&self) -> f64 {
+        self.log_det
+    }
+
+    /// Whitened innovations of a series at the windows.
+    pub fn whiten(&self, series: &[f64]) -> Vec<f64> {
+        self.whiten_from(series, 0)
+    }
+
+    /// The same for a series that is zero before window `first`; the answer starts there.
+    pub fn whiten_from(&self, series: &[f64], first: usize) -> Vec<f64> {
+        let (mut z0, mut z1, mut z2) = (0.0, 0.0, 0.0);
+        let mut out = Vec::with_capacity(series.len() - first);
+        for (row, x) in self.rows[first..].iter().zip(&series[first..]) {
+            z1 *= row.decay[0];
+            z2 *= row.decay[1];
+            let innovation = x - row.h0 * z0 - row.h1 * z1 - z2;
+            z0 = row.gain[0] * innovation;
+            z1 += row.gain[1] * innovation;
+            z2 += row.gain[2] * innovation;
+            out.push(innovation * row.per_sd);
+        }
+        out
+    }
+
+    /// Predictive standard deviation of every window given those before it.
+    pub fn predictive_sd(&self) -> Vec<f64> {
+        self.rows.iter().map(|row| 1.0 / row.per_sd).collect()
+    }
+}
+
+/// Activity of every window, from the average deviation in sleep and wake; mean square 1.
+pub fn activity(dev_ng: &[f64], asleep: &[bool]) -> Vec<f64> {
+    let mean = |state: bool| {
+        let (sum, n) = dev_ng
+            .iter()
+            .zip(asleep)
+            .filter(|(_, a)| **a == state)
+            .fold((0.0, 0usize), |(s, n), (d, _)| (s + d, n + 1));
+        (n >= 30).then(|| sum / n as f64)
+    };
+    let level = match (mean(false), mean(true)) {
+        (Some(wake), Some(sleep)) if wake > 0.0 && sleep > 0.0 => [wake, sleep],
+        _ => [1.0, 1.0],
+    };
+    let raw: Vec<f64> = asleep.iter().map(|a| level[usize::from(*a)]).collect();
+    let rms = (raw.iter().map(|x| x * x).sum::<f64>() / raw.len().max(1) as f64).sqrt();
+    raw.iter().map(|x| x / rms).collect()
+}
+
+/// Amplitude at which the prior of the slow part turns down, ng.
+const SLOW_PRIOR_NG: f64 = 10.0;
+/// Longest and shortest correlation time of the slow part, s.
+const SLOW_TAU_S: [f64; 2] = [300.0, 14_400.0];
+
+/// What a fit ends with.
+#[derive(Debug, Clone, Copy)]
+pub struct NoiseFit {
+    /// The noise.
+    pub noise: AxisNoise,
+    /// Log of restricted likelihood times prior.
+    pub log_posterior: f64,
+}
+
+/// Log prior of the noise (densities in the logarithms of its parameters).
+pub fn log_prior(noise: &AxisNoise) -> f64 {
+    let lognormal = |x: f64, centre: f64, width: f64| -0.5 * ((x / centre).ln() / width).powi(2);
+    let slow = noise.slow_ng / SLOW_PRIOR_NG;
+    let tau = noise.slow_tau_s.ln();
+    let wall = |x: f64| if x > 0.0 { 0.0 } else { -0.5 * (x / 0.15).powi(2) };
+    lognormal(noise.short_ng / noise.white_ng, 0.2, 0.6)
+        + lognormal(noise.short_tau_s, 100.0, 0.6)
+        + (slow / (1.0 + slow * slow)).ln()
+        + wall(tau - SLOW_TAU_S[0].ln())
+        + wall(SLOW_TAU_S[1].ln() - tau)
+}
+
+/// Fit the noise of one axis to `residual_ng`, whose constant is nuisance, from `start` if there is one.
+pub fn fit(
+    residual_ng: &[f64],
+    schedule: &Schedule,
+    activity: &[f64],
+    start: Option<&AxisNoise>,
+    evaluations: usize,
+) -> NoiseFit {
+    let n = residual_ng.len() as f64;
+    let mean = residual_ng.iter().sum::<f64>() / n;
+    let rms = (residual_ng.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt().max(1e-6);
+    let ones = vec![1.0; residual_ng.len()];
+    let noise_of = |p: &[f64]| {
+        let scale = rms * p[4].exp();
+        AxisNoise {
+            white_ng: scale,
+            short_ng: scale * p[0].exp(),
+            short_tau_s: p[1].exp(),
+            slow_ng: scale * p[2].exp(),
+            slow_tau_s: p[3].exp(),
+        }
+    };
+    // The overall scale is profiled: one rescaling step is exact up to the prior of the slow amplitude.
+    let evaluate = |p: &[f64]| {
+        let unit = noise_of(&[p[0], p[1], p[2], p[3], 0.0]);
+        let w = Whitener::new(&unit, schedule, activity);
+        let (d, c) = (w.whiten(residual_ng), w.whiten(&ones));
+        let (dd, dc, cc) = (dot(&d, &d), dot(&d, &c), dot(&c, &c));
+        let scale2 = (dd - dc * dc / cc) / (n - 1.0);
+        let noise = noise_of(&[p[0], p[1], p[2], p[3], 0.5 * scale2.ln()]);
+        let log_likelihood = -0.5 * (w.log_det() + (n - 1.0) * (scale2.ln() + 1.0) + cc.ln());
+        (noise, log_likelihood + log_prior(&noise))
+    };
+    let begin = match start {
+        Some(s) => {
+            [(s.short_ng / s.white_ng).ln(), s.short_tau_s.ln(), (s.slow_ng / s.white_ng).ln(), s.slow_tau_s.ln()]
+        }
+        None => [0.2_f64.ln(), 100.0_f64.ln(), 0.1_f64.ln(), 3000.0_f64.ln()],
+    };
+    let width = if start.is_some() { [0.25, 0.25, 0.4, 0.4] } else { [0.5, 0.5, 0.8, 0.8] };
+    let best = nelder_mead(&begin, &width, evaluations, |p| {
+        let outside = p
+            .iter()
+            .zip([[-6.0, 1.5], [2.0, 7.0], [-9.0, 4.0], [5.0, 10.5]])
+            .any(|(x, [low, high])| *x < low || *x > high);
+        if outside { f64::INFINITY } else { -evaluate(p).1 }
+    });
+    let (noise, log_posterior) = evaluate(&best);
+    NoiseFit { noise, log_posterior }
+}
+
+/// Dot product.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let (ca, cb) = (a.chunks_exact(8), b.chunks_exact(8));
+    let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in ca.zip(cb) {
+        for j in 0..8 {
+            lanes[j] += x[j] * y[j];
+        }
+    }
+    lanes.iter().sum::<f64>() + tail
+}

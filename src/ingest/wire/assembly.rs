@@ -1,0 +1,228 @@
+//! Packets out of frames that arrive in any order: a packet cut by a missing frame waits for it, from whatever playback.
+//!
+//! The result is a function of the set of frames: each packet belongs to the frame in which it starts, and is complete
+//! when the frames it runs over are there.
+
+use std::collections::{BTreeMap, HashMap};
+
+use super::frame::{FrameId, IDLE_DATA_ONLY, NO_PACKET_STARTS, TransferFrame};
+use super::packet::{self, PACKET_OCTETS_MAX};
+
+/// What of a frame concerns its neighbours.
+struct Edge {
+    /// Octets that continue a packet of an earlier frame.
+    head: Box<[u8]>,
+    /// No packet starts here: the head is the whole frame (empty for idle data).
+    passes_on: bool,
+    /// The last packet that starts here and does not end here.
+    tail: Option<Box<[u8]>>,
+}
+
+/// Where a packet came from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Placement {
+    /// The frame in which it starts.
+    pub first: FrameId,
+    /// The frame in which it ends.
+    pub last: FrameId,
+}
+
+/// Something that became whole when a frame arrived.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Assembled<'a> {
+    /// A packet, primary header and all.
+    Packet(Placement, &'a [u8]),
+    /// The frames of a packet are all there and contradict each other: what there is of it.
+    Broken(Placement, &'a [u8]),
+}
+
+/// Joins packets over frame borders.
+#[derive(Default)]
+pub struct Assembler {
+    channels: HashMap<u8, BTreeMap<u32, Edge>>,
+}
+
+/// More frames than this no packet runs over: the longest packet in frames that hold one octet of data each would.
+const SPAN_FRAMES_MAX: u32 = PACKET_OCTETS_MAX as u32;
+
+impl Assembler {
+    /// Takes one frame (each identity once) and hands on every packet that it completes.
+    pub fn take(&mut self, frame: &TransferFrame<'_>, mut hand_on: impl FnMut(Assembled<'_>)) {
+        let edge = walk(frame, &mut hand_on);
+        let (continues, opens) = (edge.passes_on || !edge.head.is_empty(), edge.tail.is_some());
+        let edges = self.channels.entry(frame.id.channel).or_default();
+        edges.insert(frame.id.count, edge);
+        if continues && let Some(start) = start_of_packet_into(edges, frame.id.count) {
+            complete(edges, FrameId { count: start, ..frame.id }, &mut hand_on);
+        }
+        if opens {
+            complete(edges, frame.id, &mut hand_on);
+        }
+    }
+
+    /// Frames held, of every channel.
+    pub fn frames(&self) -> usize {
+        self.channels.values().map(BTreeMap::len).sum()
+    }
+}
+
+/// Hands on the packets that lie wholly inside a frame.
+fn walk(frame: &TransferFrame<'_>, hand_on: &mut impl FnMut(Assembled<'_>)) -> Edge {
+    match frame.first_header {
+        IDLE_DATA_ONLY => return Edge { head: Box::default(), passes_on: true, tail: None },
+        NO_PACKET_STARTS => return Edge { head: frame.data.into(), passes_on: true, tail: None },
+        _ => {}
+    }
+    let (head, mut rest) = frame.data.split_at(usize::from(frame.first_header));
+    let placement = Placement { first: frame.id, last: frame.id };
+    while let Some(total) = packet::total_octets(rest)
+        && total <= rest.len()
+    {
+        hand_on(Assembled::Packet(placement, &rest[..total]));
+        rest = &rest[total..];
+    }
+    Edge { head: head.into(), passes_on: false, tail: (!rest.is_empty()).then(|| rest.into()) }
+}
+
+/// The frame with the unfinished packet that the head of frame `count` continues, if everything between is there.
+fn start_of_packet_into(edges: &BTreeMap<u32, Edge>, count: u32) -> Option<u32> {
+    let mut at = count;
+    for _ in 0..SPAN_FRAMES_MAX {
+        at = at.wrapping_sub(1);
+        let edge = edges.get(&at)?;
+        if edge.tail.is_some() {
+            return Some(at);
+        }
+        if !edge.passes_on {
+            return None;
+        }
+    }
+    None
+}
+
+/// Hands on the packet that starts at the end of frame `first`, when the frames it runs over are there.
+fn complete(edges: &mut BTreeMap<u32, Edge>, first: FrameId, hand_on: &mut impl FnMut(Assembled<'_>)) {
+    let Some(tail) = edges.get(&first.count).and_then(|edge| edge.tail.as_ref()) else { return };
+    let mut octets = tail.to_vec();
+    let mut last = first;
+    let whole = loop {
+        last.count = last.count.wrapping_add(1);
+        let Some(edge) = edges.get(&last.count) else { return };
+        octets.extend_from_slice(&edge.head);
+        let total = packet::total_octets(&octets);
+        if !edge.passes_on {
+            break total == Some(octets.len());
+        }
+        match total {
+            Some(total) if octets.len() >= total => break octets.len() == total,
+            _ if octets.len() > PACKET_OCTETS_MAX => break false,
+            _ => {}
+        }
+    };
+    let placement = Placement { first, last };
+    hand_on(if whole { Assembled::Packet(placement, &octets) } else { Assembled::Broken(placement, &octets) });
+    forget(edges, placement);
+}
+
+/// Frees what a settled packet held.
+fn forget(edges: &mut BTreeMap<u32, Edge>, placement: Placement) {
+    if let Some(edge) = edges.get_mut(&placement.first.count) {
+        edge.tail = None;
+    }
+    if let Some(edge) = edges.get_mut(&placement.last.count)
+        && !edge.passes_on
+    {
+        edge.head = Box::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ingest::wire::LinkConfig;
+    use crate::ingest::wire::frame;
+    use crate::ingest::wire::packet::{Apid, PacketId, write, write_idle};
+    use crate::units::Clock;
+
+    /// Small frames, so that packets run over several.
+    const LINK: LinkConfig =
+        LinkConfig { spacecraft_id: 0x41, frame_octets: 52, randomised: false, reed_solomon_interleave: None };
+
+    /// Twenty packets of many lengths, and the frames that carry them.
+    fn stream() -> (Vec<Vec<u8>>, Vec<Vec<u8>>) {
+        let packets: Vec<Vec<u8>> = (0..20u16)
+            .map(|n| {
+                let id = PacketId { apid: Apid::EVT, clock: Clock::from_tenths(i64::from(n)), sequence: n };
+                write(id, &vec![n as u8; usize::from(n * 37 % 131) + 1])
+            })
+            .collect();
+        let mut octets = packets.concat();
+        octets.extend(write_idle(0, 47 + (40 - (octets.len() + 47) % 40) % 40));
+        let mut starts = vec![];
+        let mut at = 0;
+        while at < octets.len() {
+            starts.push(at);
+            at += packet::total_octets(&octets[at..]).unwrap();
+        }
+        let frames = octets
+            .chunks(40)
+            .enumerate()
+            .map(|(count, data)| {
+                let inside = starts.iter().find(|start| (count * 40..count * 40 + 40).contains(*start));
+                let first_header = inside.map_or(NO_PACKET_STARTS, |start| (start - count * 40) as u16);
+                frame::write(&LINK, FrameId { channel: 1, count: count as u32 }, 0, first_header, data)
+            })
+            .collect();
+        (packets, frames)
+    }
+
+    fn assemble(frames: &[Vec<u8>]) -> Vec<Vec<u8>> {
+        let mut assembler = Assembler::default();
+        let mut packets = Vec::new();
+        for octets in frames {
+            let frame = TransferFrame::read(&LINK, octets).unwrap();
+            assembler.take(&frame, |assembled| match assembled {
+                Assembled::Packet(_, packet) if packet::apid(packet) != Apid::IDLE => packets.push(packet.to_vec()),
+                Assembled::Packet(..) => {}
+                Assembled::Broken(..) => panic!("nothing is broken here"),
+            });
+        }
+        packets.sort();
+        packets
+    }
+
+    #[test]
+    fn the_order_of_frames_does_not_matter() {
+        let (mut packets, frames) = stream();
+        packets.sort();
+        assert_eq!(assemble(&frames), packets);
+        for step in [3, 7, 11, 13] {
+            let shuffled: Vec<_> = (0..frames.len()).map(|i| frames[i * step % frames.len()].clone()).collect();
+            if shuffled.iter().collect::<std::collections::BTreeSet<_>>().len() == frames.len() {
+                assert_eq!(assemble(&shuffled), packets, "step {step}");
+            }
+        }
+        let backwards: Vec<_> = frames.iter().rev().cloned().collect();
+        assert_eq!(assemble(&backwards), packets);
+    }
+
+    #[test]
+    fn a_missing_frame_costs_only_the_packets_that_touch_it() {
+        let (packets, frames) = stream();
+        for missing in 0..frames.len() {
+            let mut left = frames.clone();
+            left.remove(missing);
+            let mut expected = Vec::new();
+            let mut at = 0;
+            for packet in &packets {
+                let touches = at / 40..=(at + packet.len() - 1) / 40;
+                if !touches.contains(&missing) {
+                    expected.push(packet.clone());
+                }
+                at += packet.len();
+            }
+            expected.sort();
+            assert_eq!(assemble(&left), expected, "without frame {missing}");
+        }
+    }
+}

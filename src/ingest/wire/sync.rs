@@ -1,0 +1,532 @@
+//! From a bit stream to transfer frames, whatever the direction, polarity and bit alignment of the playback.
+//!
+//! While searching, a marker with at most one wrong bit at any bit offset, in any of the four senses, is a candidate; it is
+//! believed when its frame checks. Once locked, the next frame is expected in its place: a marker with at most three
+//! wrong bits is accepted there, and two frames without one are passed over (their frames are still tried) before the
+//! search starts again behind the last good frame, so that nothing is skipped. Every decision waits for the bits it
+//! needs: how the stream is cut into chunks changes nothing.
+
+use super::coding::{ChannelDecoder, LinkConfig, SYNC_MARKER};
+use super::frame::{FrameId, FrameRefusal, TransferFrame};
+
+/// Wrong bits allowed in a marker while searching.
+const SEARCH_WRONG_BITS_MAX: u32 = 1;
+/// Wrong bits allowed in a marker at its expected place.
+const LOCKED_WRONG_BITS_MAX: u32 = 3;
+/// Frames without a marker that are passed over before searching again.
+const FLYWHEEL_FRAMES_MAX: u32 = 2;
+/// Frames that do not check, in their expected places, before searching again: bounds what must be kept.
+const UNCHECKED_FRAMES_MAX: u32 = 256;
+/// Bits of the marker.
+const MARKER_BITS: u64 = 32;
+
+/// Whether the tape ran forward.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Direction {
+    /// First bit first.
+    Forward,
+    /// Last bit first.
+    Reverse,
+}
+
+/// Whether the bits are as they were written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Polarity {
+    /// As written.
+    Normal,
+    /// Every bit complemented.
+    Inverted,
+}
+
+/// One of the four senses of a playback.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Sense {
+    /// Direction of the tape.
+    pub direction: Direction,
+    /// Polarity of the link.
+    pub polarity: Polarity,
+}
+
+impl Sense {
+    /// The four, in the order in which they are tried.
+    pub const ALL: [Sense; 4] = [
+        Sense { direction: Direction::Forward, polarity: Polarity::Normal },
+        Sense { direction: Direction::Forward, polarity: Polarity::Inverted },
+        Sense { direction: Direction::Reverse, polarity: Polarity::Normal },
+        Sense { direction: Direction::Reverse, polarity: Polarity::Inverted },
+    ];
+
+    /// The marker as it appears in a stream of this sense.
+    const fn marker(self) -> u32 {
+        let marker = match self.direction {
+            Direction::Forward => SYNC_MARKER,
+            Direction::Reverse => SYNC_MARKER.reverse_bits(),
+        };
+        match self.polarity {
+            Polarity::Normal => marker,
+            Polarity::Inverted => !marker,
+        }
+    }
+
+    /// `forward` or `reverse`.
+    pub const fn direction_word(self) -> &'static str {
+        match self.direction {
+            Direction::Forward => "forward",
+            Direction::Reverse => "reverse",
+        }
+    }
+
+    /// `normal` or `inverted`.
+    pub const fn polarity_word(self) -> &'static str {
+        match self.polarity {
+            Polarity::Normal => "normal",
+            Polarity::Inverted => "inverted",
+        }
+    }
+}
+
+/// What became of a frame found in the stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// It checks.
+    Good(FrameId),
+    /// It is not used, and why.
+    Refused(FrameRefusal),
+}
+
+/// A frame found in the stream, good or not.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Arrival {
+    /// The sense in which it was found.
+    pub sense: Sense,
+    /// First received bit of the frame (its marker left out), counted from the start of the stream.
+    pub first_bit: u64,
+    /// What became of it.
+    pub verdict: Verdict,
+    /// The frame, channel coding removed where that succeeded, as it was received otherwise.
+    pub octets: Vec<u8>,
+}
+
+/// A frame in its expected place.
+#[derive(Debug, Clone, Copy)]
+struct Lock {
+    sense: Sense,
+    /// Where the next marker-and-frame begins.
+    next_bit: u64,
+    /// Frames without a marker so far.
+    passed_over: u32,
+    /// Frames that did not check since the last good one.
+    unchecked: u32,
+}
+
+/// Finds frames in one stream of bits.
+pub struct Deframer {
+    link: LinkConfig,
+    decoder: ChannelDecoder,
+    /// The bits still needed.
+    buffer: Vec<u8>,
+    /// Octets dropped before `buffer`.
+    dropped_octets: u64,
+    lock: Option<Lock>,
+    /// Next bit to try as the start of a marker.
+    search_bit: u64,
+    /// End of the last good frame: nothing before it is read again.
+    floor_bit: u64,
+    /// Refused frames that a good one may still show to be none.
+    doubtful: Vec<Arrival>,
+}
+
+impl Deframer {
+    /// For a stream of this link, whose configuration must have no faults.
+    pub fn new(link: LinkConfig) -> Self {
+        Self {
+            link,
+            decoder: ChannelDecoder::new(link),
+            buffer: Vec::new(),
+            dropped_octets: 0,
+            lock: None,
+            search_bit: 0,
+            floor_bit: 0,
+            doubtful: Vec::new(),
+        }
+    }
+
+    /// Bits received so far.
+    pub fn received_bits(&self) -> u64 {
+        (self.dropped_octets + self.buffer.len() as u64) * 8
+    }
+
+    /// Takes the next octets of the stream and hands on the frames they complete, in the order received.
+    pub fn push(&mut self, octets: &[u8], mut hand_on: impl FnMut(Arrival)) {
+        self.buffer.extend_from_slice(octets);
+        while self.step(false, &mut hand_on) {}
+        self.drop_what_is_read();
+    }
+
+    /// The stream has ended: hands on what was waiting for more bits.
+    pub fn finish(&mut self, mut hand_on: impl FnMut(Arrival)) {
+        while self.step(true, &mut hand_on) {}
+        self.doubtful.drain(..).for_each(hand_on);
+    }
+
+    fn coded_bits(&self) -> u64 {
+        self.link.coded_octets() as u64 * 8
+    }
+
+    /// One decision; false when more bits are needed.
+    fn step(&mut self, ended: bool, hand_on: &mut impl FnMut(Arrival)) -> bool {
+        match self.lock {
+            Some(lock) => self.step_locked(lock, ended, hand_on),
+            None => self.step_search(ended, hand_on),
+        }
+    }
+
+    fn step_locked(&mut self, mut lock: Lock, ended: bool, hand_on: &mut impl FnMut(Arrival)) -> bool {
+        let unit_bits = MARKER_BITS + self.coded_bits();
+        if lock.next_bit + unit_bits > self.received_bits() {
+            if ended {
+                self.search_again();
+            }
+            return ended;
+        }
+        let (marker_bit, frame_bit) = match lock.sense.direction {
+            Direction::Forward => (lock.next_bit, lock.next_bit + MARKER_BITS),
+            Direction::Reverse => (lock.next_bit + self.coded_bits(), lock.next_bit),
+        };
+        let wrong_bits = (self.word_at(marker_bit) ^ lock.sense.marker()).count_ones();
+        let arrival = self.read_frame(lock.sense, frame_bit);
+        let end_bit = lock.next_bit + unit_bits;
+        lock.next_bit = end_bit;
+        if accepted(&arrival) {
+            lock.passed_over = 0;
+            self.believe(lock, arrival, end_bit, hand_on);
+            return true;
+        }
+        if wrong_bits <= LOCKED_WRONG_BITS_MAX {
+            lock.passed_over = 0;
+            self.doubtful.push(arrival);
+        } else {
+            lock.passed_over += 1;
+        }
+        lock.unchecked += 1;
+        self.lock = Some(lock);
+        if lock.passed_over > FLYWHEEL_FRAMES_MAX || lock.unchecked > UNCHECKED_FRAMES_MAX {
+            self.search_again();
+        }
+        true
+    }
+
+    /// Gives up the lock and searches from the last good frame on.
+    fn search_again(&mut self) {
+        self.lock = None;
+        self.doubtful.clear();
+        self.search_bit = self.floor_bit;
+    }
+
+    fn step_search(&mut self, ended: bool, hand_on: &mut impl FnMut(Arrival)) -> bool {
+        let found = self.next_marker();
+        self.settle_doubtful(hand_on);
+        let Some((bit, sense)) = found else { return false };
+        let coded_bits = self.coded_bits();
+        let frame_bit = match sense.direction {
+            Direction::Forward => bit + MARKER_BITS,
+            Direction::Reverse if bit >= self.floor_bit + coded_bits => bit - coded_bits,
+            Direction::Reverse => {
+                self.doubtful.push(self.truncated(sense, self.floor_bit, bit));
+                self.search_bit = bit + 1;
+                return true;
+            }
+        };
+        if frame_bit + coded_bits > self.received_bits() {
+            self.search_bit = bit;
+            if !ended {
+                return false;
+            }
+            self.doubtful.push(self.truncated(sense, frame_bit, self.received_bits()));
+            self.search_bit = bit + 1;
+            return true;
+        }
+        let arrival = self.read_frame(sense, frame_bit);
+        self.search_bit = bit + 1;
+        if accepted(&arrival) {
+            let end_bit = bit.max(frame_bit) + if frame_bit > bit { coded_bits } else { MARKER_BITS };
+            self.believe(Lock { sense, next_bit: end_bit, passed_over: 0, unchecked: 0 }, arrival, end_bit, hand_on);
+        } else {
+            self.doubtful.push(arrival);
+        }
+        true
+    }
+
+    /// Hands on refused frames that no frame found from here on can reach back to.
+    fn settle_doubtful(&mut self, hand_on: &mut impl FnMut(Arrival)) {
+        let reach_bits = 2 * (MARKER_BITS + self.coded_bits());
+        let settled =
+            self.doubtful.iter().take_while(|arrival| arrival.first_bit + reach_bits < self.search_bit).count();
+        self.doubtful.drain(..settled).for_each(hand_on);
+    }
+
+    /// A frame checks: what was doubtful before it is settled, and the next one is expected behind it.
+    fn believe(&mut self, lock: Lock, good: Arrival, end_bit: u64, hand_on: &mut impl FnMut(Arrival)) {
+        let start_bit = end_bit - MARKER_BITS - self.coded_bits();
+        for doubtful in self.doubtful.drain(..) {
+            // A marker inside a frame that checks was none.
+            if doubtful.first_bit <= start_bit {
+                hand_on(doubtful);
+            }
+        }
+        hand_on(good);
+        self.floor_bit = end_bit;
+        self.search_bit = end_bit;
+        self.lock = Some(Lock { unchecked: 0, ..lock });
+    }
+
+    fn read_frame(&mut self, sense: Sense, frame_bit: u64) -> Arrival {
+        let mut octets = self.bits(sense, frame_bit, self.coded_bits());
+        let verdict = match self.decoder.decode(&mut octets) {
+            Err(refusal) => Verdict::Refused(refusal),
+            Ok(()) => match TransferFrame::read(&self.link, &octets) {
+                Ok(frame) => Verdict::Good(frame.id),
+                Err(refusal) => Verdict::Refused(refusal),
+            },
+        };
+        Arrival { sense, first_bit: frame_bit, verdict, octets }
+    }
+
+    /// A frame of which only a part is in the stream; whole octets of it are kept.
+    fn truncated(&self, sense: Sense, from_bit: u64, to_bit: u64) -> Arrival {
+        let bits = (to_bit - from_bit) / 8 * 8;
+        let start_bit = match sense.direction {
+            Direction::Forward => from_bit,
+            Direction::Reverse => to_bit - bits,
+        };
+        let octets = self.bits(sense, start_bit, bits);
+        Arrival { sense, first_bit: start_bit, verdict: Verdict::Refused(FrameRefusal::Truncated), octets }
+    }
+
+    /// The next place, from `search_bit` on, where a marker of any sense stands; moves `search_bit` up to it, or to the
+    /// first place that cannot be decided yet.
+    fn next_marker(&mut self) -> Option<(u64, Sense)> {
+        let base_bit = self.dropped_octets * 8;
+        let mut at = (self.search_bit - base_bit) as usize;
+        let end = (self.buffer.len() * 8).checked_sub(MARKER_BITS as usize - 1)?;
+        let forward = Sense::ALL[0].marker();
+        let reverse = Sense::ALL[2].marker();
+        while at < end {
+            let octet = at / 8;
+            let mut window = [0u8; 8];
+            let there = &self.buffer[octet..(octet + 8).min(self.buffer.len())];
+            window[..there.len()].copy_from_slice(there);
+            let window = u64::from_be_bytes(window);
+            let last = (end - octet * 8).min(32);
+            for shift in at % 8..last {
+                let word = (window << shift >> 32) as u32;
+                // A marker or its complement: almost all its bits agree, or almost none.
+                let agree = [(word ^ forward).count_ones(), (word ^ reverse).count_ones()];
+                let far = 32 - SEARCH_WRONG_BITS_MAX;
+                let is_near = |wrong: u32| wrong <= SEARCH_WRONG_BITS_MAX || wrong >= far;
+                if is_near(agree[0]) || is_near(agree[1]) {
+                    let sense = match (is_near(agree[0]), agree[0] >= far, agree[1] >= far) {
+                        (true, false, _) => Sense::ALL[0],
+                        (true, true, _) => Sense::ALL[1],
+                        (false, _, false) => Sense::ALL[2],
+                        (false, _, true) => Sense::ALL[3],
+                    };
+                    self.search_bit = base_bit + (octet * 8 + shift) as u64;
+                    return Some((self.search_bit, sense));
+                }
+            }
+            at = octet * 8 + last;
+        }
+        self.search_bit = base_bit + at as u64;
+        None
+    }
+
+    /// 32 bits of the stream as received.
+    fn word_at(&self, bit: u64) -> u32 {
+        let at = bit - self.dropped_octets * 8;
+        let (octet, shift) = ((at / 8) as usize, at % 8);
+        let octets = &self.buffer[octet..(octet + 5).min(self.buffer.len())];
+        let window = octets.iter().fold(0u64, |window, next| window << 8 | u64::from(*next));
+        let spare = octets.len() as u64 * 8 - 32;
+        (window >> (spare - shift)) as u32
+    }
+
+    /// Whole octets of the stream from `bit` on, in the order and polarity in which they were written.
+    fn bits(&self, sense: Sense, bit: u64, bits: u64) -> Vec<u8> {
+        let at = bit - self.dropped_octets * 8;
+        let (start, shift) = ((at / 8) as usize, at % 8);
+        let count = (bits / 8) as usize;
+        let mut octets = match shift {
+            0 => self.buffer[start..start + count].to_vec(),
+            _ => {
+                let window = &self.buffer[start..=start + count];
+                window.windows(2).map(|pair| pair[0] << shift | pair[1] >> (8 - shift)).collect()
+            }
+        };
+        if sense.direction == Direction::Reverse {
+            octets.reverse();
+            octets.iter_mut().for_each(|octet| *octet = octet.reverse_bits());
+        }
+        if sense.polarity == Polarity::Inverted {
+            octets.iter_mut().for_each(|octet| *octet = !*octet);
+        }
+        octets
+    }
+
+    /// Drops octets that no later decision reads, when enough of them have gathered to be worth the move.
+    fn drop_what_is_read(&mut self) {
+        const WORTH_MOVING_OCTETS: u64 = 1 << 14;
+        let needed_bit = match self.lock {
+            Some(_) => self.floor_bit,
+            None => self.floor_bit.max(self.search_bit.saturating_sub(self.coded_bits())),
+        };
+        let done = needed_bit / 8 - self.dropped_octets;
+        if done >= WORTH_MOVING_OCTETS.min(self.buffer.len() as u64 / 2 + 1) {
+            self.buffer.drain(..done as usize);
+            self.dropped_octets += done;
+        }
+    }
+}
+
+/// Whether a frame's error control vouches for its place, whoever it belongs to.
+fn accepted(arrival: &Arrival) -> bool {
+    match arrival.verdict {
+        Verdict::Good(_) => true,
+        Verdict::Refused(refusal) => matches!(refusal, FrameRefusal::Spacecraft | FrameRefusal::Header),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ingest::wire::frame;
+    use proptest::prelude::*;
+
+    const LINK: LinkConfig =
+        LinkConfig { spacecraft_id: 0x41, frame_octets: 64, randomised: false, reed_solomon_interleave: None };
+
+    fn frames(count: u32) -> Vec<Vec<u8>> {
+        let data = |n: u32| (0..52u32).map(|i| (n * 31 + i * 7) as u8).collect::<Vec<u8>>();
+        (0..count).map(|n| frame::write(&LINK, FrameId { channel: 1, count: n }, 0, 0, &data(n))).collect()
+    }
+
+    fn to_bits(octets: &[u8]) -> Vec<bool> {
+        octets.iter().flat_map(|octet| (0..8).map(move |bit| octet & (0x80 >> bit) != 0)).collect()
+    }
+
+    fn to_octets(bits: &[bool]) -> Vec<u8> {
+        bits.chunks(8).map(|c| c.iter().enumerate().fold(0, |o, (i, bit)| o | u8::from(*bit) << (7 - i))).collect()
+    }
+
+    /// A playback of these frames in a sense, behind so many alternating leading bits.
+    fn playback(frames: &[Vec<u8>], sense: Sense, leading_bits: usize) -> Vec<bool> {
+        let mut bits: Vec<bool> = frames
+            .iter()
+            .flat_map(|frame| to_bits(&SYNC_MARKER.to_be_bytes()).into_iter().chain(to_bits(frame)))
+            .collect();
+        if sense.direction == Direction::Reverse {
+            bits.reverse();
+        }
+        if sense.polarity == Polarity::Inverted {
+            bits.iter_mut().for_each(|bit| *bit = !*bit);
+        }
+        (0..leading_bits).map(|bit| bit % 2 == 0).chain(bits).collect()
+    }
+
+    fn arrivals(octets: &[u8], chunk_octets: usize) -> Vec<Arrival> {
+        let mut deframer = Deframer::new(LINK);
+        let mut found = Vec::new();
+        octets.chunks(chunk_octets).for_each(|chunk| deframer.push(chunk, |arrival| found.push(arrival)));
+        deframer.finish(|arrival| found.push(arrival));
+        found
+    }
+
+    fn good_counts(found: &[Arrival]) -> Vec<u32> {
+        found.iter().filter_map(|a| if let Verdict::Good(id) = a.verdict { Some(id.count) } else { None }).collect()
+    }
+
+    #[test]
+    fn all_four_senses_are_found_at_every_bit_offset() {
+        let frames = frames(4);
+        for sense in Sense::ALL {
+            for leading_bits in 0..16 {
+                let found = arrivals(&to_octets(&playback(&frames, sense, leading_bits)), 1000);
+                let mut counts = good_counts(&found);
+                assert!(found.iter().all(|arrival| arrival.sense == sense));
+                if sense.direction == Direction::Reverse {
+                    counts.reverse();
+                }
+                assert_eq!(counts, [0, 1, 2, 3], "{sense:?} behind {leading_bits} bits");
+            }
+        }
+    }
+
+    #[test]
+    fn three_wrong_bits_in_an_expected_marker_and_one_in_the_first_do_no_harm() {
+        let frames = frames(5);
+        let unit = 32 + 64 * 8;
+        for sense in [Sense::ALL[0], Sense::ALL[1]] {
+            let mut bits = playback(&frames, sense, 3);
+            bits[3 + 7] ^= true;
+            for wrong in [2, 11, 30] {
+                bits[3 + 2 * unit + wrong] ^= true;
+            }
+            assert_eq!(good_counts(&arrivals(&to_octets(&bits), 7)), [0, 1, 2, 3, 4]);
+        }
+    }
+
+    #[test]
+    fn a_bit_slip_costs_only_the_frame_it_is_in() {
+        let frames = frames(8);
+        let unit = 32 + 64 * 8;
+        for sense in Sense::ALL {
+            let mut bits = playback(&frames, sense, 5);
+            bits.remove(5 + 3 * unit + 200);
+            let mut counts = good_counts(&arrivals(&to_octets(&bits), 33));
+            if sense.direction == Direction::Reverse {
+                counts.iter_mut().for_each(|count| *count = 7 - *count);
+            }
+            assert_eq!(counts, [0, 1, 2, 4, 5, 6, 7], "{sense:?}");
+        }
+    }
+
+    #[test]
+    fn a_frame_that_is_cut_off_is_refused_as_truncated() {
+        let octets = to_octets(&playback(&frames(2), Sense::ALL[0], 0));
+        let found = arrivals(&octets[..octets.len() - 30], 10);
+        assert_eq!(good_counts(&found), [0]);
+        assert_eq!(found[1].verdict, Verdict::Refused(FrameRefusal::Truncated));
+    }
+
+    #[test]
+    fn noise_without_end_is_held_in_bounded_memory() {
+        let mut deframer = Deframer::new(LINK);
+        let marker_and_noise: Vec<u8> = SYNC_MARKER.to_be_bytes().into_iter().chain([0x33; 64]).collect();
+        let mut refused = 0;
+        for _ in 0..20_000 {
+            deframer.push(&marker_and_noise, |_| refused += 1);
+        }
+        assert!(deframer.buffer.len() < 100_000 && deframer.doubtful.len() < 1000);
+        assert!(refused > 19_000);
+    }
+
+    proptest! {
+        #[test]
+        fn chunks_change_nothing(
+            damage in prop::collection::vec((0usize..6000, 0u8..3), 0..12),
+            sense in 0usize..4, leading_bits in 0usize..9, chunk_octets in 1usize..200,
+        ) {
+            let mut bits = playback(&frames(10), Sense::ALL[sense], leading_bits);
+            for (at, kind) in damage {
+                let at = at % bits.len();
+                match kind {
+                    0 => bits[at] ^= true,
+                    1 => { bits.remove(at); }
+                    _ => bits.insert(at, true),
+                }
+            }
+            let octets = to_octets(&bits);
+            prop_assert_eq!(arrivals(&octets, chunk_octets), arrivals(&octets, octets.len()));
+        }
+    }
+}
