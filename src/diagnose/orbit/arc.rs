@@ -87,7 +87,7 @@ impl Arc {
         candidates: &[Term],
         from: Option<&ArcFit>,
     ) -> ArcFit {
-        let mut fit = self.first_guess(active, candidates, from);
+        let mut fit = self.first_guess(active, &[], from);
         for _ in 0..ITERATIONS_MAX {
             self.propagate(environment, baseline, &mut fit);
             let unknowns = 6 + active.iter().map(|term| term.parameters().len()).sum::<usize>();
@@ -102,6 +102,8 @@ impl Arc {
                 break;
             }
         }
+        // The candidates' columns are wanted once only, along the orbit that was found.
+        fit.columns = self.first_guess(active, candidates, None).columns;
         self.propagate(environment, baseline, &mut fit);
         fit
     }
