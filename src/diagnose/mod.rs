@@ -8,3 +8,6 @@ pub mod measured;
 pub mod noise;
 mod optimise;
 pub mod orbit;
+pub mod poses;
+pub mod report;
+pub mod series;

@@ -36,6 +36,28 @@ pub enum MeasuredError {
         /// Its name.
         file: String,
     },
+    /// A line of a recording.
+    #[error("{file}, line {line}: expected {expected}, found {found:?}")]
+    Line {
+        /// File name.
+        file: String,
+        /// Line number, from 1.
+        line: usize,
+        /// What belongs there.
+        expected: String,
+        /// What was there.
+        found: String,
+    },
+    /// Too little to work on.
+    #[error("the recording holds {found} usable {what}, expected at least {expected}")]
+    TooFew {
+        /// Of what.
+        what: &'static str,
+        /// How many.
+        found: usize,
+        /// How many are needed.
+        expected: usize,
+    },
     /// A precise orbit.
     #[error(transparent)]
     Orbit(#[from] OrbitError),
@@ -139,7 +161,8 @@ pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result
     }
     match case.kind {
         Kind::OrbitSp3 => orbit::diagnose(case, files),
-        Kind::SeriesCsv | Kind::StaticPoses => Err(case.wrong("recording.kind", "orbit_sp3")),
+        Kind::SeriesCsv => crate::diagnose::series::diagnose(case, files),
+        Kind::StaticPoses => crate::diagnose::poses::diagnose(case, files),
     }
 }
 
