@@ -4,6 +4,7 @@
 
 mod figures;
 mod page;
+mod plates;
 mod reduce;
 mod sentence;
 
