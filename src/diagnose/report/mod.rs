@@ -4,7 +4,6 @@
 
 mod figures;
 mod page;
-mod plates;
 mod reduce;
 mod sentence;
 
