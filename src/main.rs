@@ -24,6 +24,8 @@ enum Command {
     Replay(command::replay::Args),
     /// Products out of a data directory.
     Export(command::export::Args),
+    /// Says what physics a simulation left out, from a case directory.
+    Diagnose(command::diagnose::Args),
     /// Makes, seals, runs and scores concealed cases.
     Challenge(command::challenge::Args),
 }
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
         Command::Serve(args) => command::serve::run(args),
         Command::Replay(args) => command::replay::run(args),
         Command::Export(args) => command::export::run(args),
+        Command::Diagnose(args) => command::diagnose::run(args),
         Command::Challenge(args) => command::challenge::run(args),
     };
     done.unwrap_or_else(|error| {

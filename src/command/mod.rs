@@ -5,6 +5,7 @@ pub mod export;
 
 use std::process::ExitCode;
 
+pub mod diagnose;
 pub mod process;
 pub mod replay;
 pub mod serve;

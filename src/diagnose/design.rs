@@ -210,6 +210,12 @@ impl<'a> Chosen<'a> {
         column.dot(&self.data) - overlap.dot(&self.reduced) - 0.5 * (column.dot(column) - overlap.dot(&overlap))
     }
 
+    /// What is left of a column beside those chosen: its squared norm, and its product with what is left of the data.
+    pub fn left_in(&self, column: &Column) -> (f64, f64) {
+        let overlap = self.overlap(column);
+        (column.dot(column) - overlap.norm_squared(), column.dot(&self.data) - overlap.dot(&self.reduced))
+    }
+
     /// Posterior mean and covariance of the scaled coefficients.
     pub fn posterior(&self) -> (DVector<f64>, DMatrix<f64>) {
         match &self.cholesky {

@@ -15,6 +15,7 @@ use super::noise::{Schedule, activity};
 pub type Axes = [Vec<f64>; 3];
 
 /// The case, measured and furnished with its physics.
+#[derive(Clone)]
 pub struct Scene<'a> {
     /// The case.
     pub case: &'a Case,
@@ -101,6 +102,11 @@ impl<'a> Scene<'a> {
             period_s,
             case,
         })
+    }
+
+    /// The same scene with another residual: a bootstrap replicate.
+    pub fn with_residual(&self, residual_ng: Axes) -> Self {
+        Self { residual_ng, ..self.clone() }
     }
 
     /// Window centres.

@@ -49,6 +49,8 @@ pub struct Solution {
     pub listed: Vec<Weighed>,
     /// Sets with an open form.
     pub open: Vec<Weighed>,
+    /// Score of every entry alone, at the noise of the null.
+    pub singles: Vec<(usize, f64)>,
 }
 
 impl Solution {
@@ -75,9 +77,15 @@ pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -
     let mut noise = noise_null;
     let mut best_key = Vec::new();
     let mut round = 0;
-    let (frame, listed, opens) = loop {
+    let mut singles: Vec<(usize, f64)> = Vec::new();
+    let (listed, opens) = loop {
         let frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
         let bank = Bank::new(&frame, entries);
+        if round == 0 {
+            let nothing = Set::default();
+            let chosen = nothing.chosen(&frame);
+            singles = (0..entries.len()).map(|i| (i, search::best_of_entry(&bank, i, &chosen).0)).collect();
+        }
         let mut listed = search::grow(&frame, &bank, &listed_ids, vec![Set::default()], SET_MAX);
         listed.retain(|s| !s.members.is_empty());
         polish(scene, &frame, entries, &mut listed, 8);
@@ -99,14 +107,13 @@ pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -
         distinct(&mut opens);
         round += 1;
         let top = [listed.first(), opens.first()].into_iter().flatten().max_by(|a, b| a.score.total_cmp(&b.score));
-        let Some(top) = top else { break (frame, listed, opens) };
+        let Some(top) = top else { break (listed, opens) };
         if top.score < WORTH_A_REFIT || round == 3 || top.key() == best_key {
-            break (frame, listed, opens);
+            break (listed, opens);
         }
         best_key = top.key();
         noise = search::weigh_with_own_noise(scene, entries, top, &noise, 2, 50).noise;
     };
-    let _ = frame;
     let weigh = |sets: Vec<Set>, count: usize| {
         let top = sets.first().map_or(0.0, |s| s.score);
         let worth = top > WORTH_A_REFIT;
@@ -115,7 +122,7 @@ pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -
         weighed.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
         weighed
     };
-    Solution { listed: weigh(listed, OWN_NOISE[0]), open: weigh(opens, OWN_NOISE[1]), null }
+    Solution { listed: weigh(listed, OWN_NOISE[0]), open: weigh(opens, OWN_NOISE[1]), null, singles }
 }
 
 /// Refine the best sets at one noise, and sort again.
