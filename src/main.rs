@@ -18,6 +18,8 @@ struct Arguments {
 enum Command {
     /// Dumps in, product files out: the pipeline without sockets.
     Process(command::process::Args),
+    /// A mission flown: its dump and its truth.
+    Simulate(command::simulate::Args),
     /// The service: dumps in at a TCP port, products out over HTTP and WebSocket.
     Serve(command::serve::Args),
     /// Sends dump files as a recorder playback would arrive.
@@ -33,6 +35,7 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Process(args) => command::process::run(args),
+        Command::Simulate(args) => command::simulate::run(args),
         Command::Serve(args) => command::serve::run(args),
         Command::Replay(args) => command::replay::run(args),
         Command::Export(args) => command::export::run(args),

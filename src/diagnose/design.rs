@@ -56,7 +56,13 @@ impl Column {
                     }
                     a.constant -= factor * b.constant;
                 }
-                None => *a = Some(Part { first: b.first, whitened: b.whitened.iter().map(|y| -factor * y).collect(), constant: -factor * b.constant }),
+                None => {
+                    *a = Some(Part {
+                        first: b.first,
+                        whitened: b.whitened.iter().map(|y| -factor * y).collect(),
+                        constant: -factor * b.constant,
+                    })
+                }
             }
         }
         out
@@ -143,7 +149,8 @@ impl<'a> Chosen<'a> {
         for column in fixed {
             data = data.less(column, 1.0);
         }
-        let mut log_evidence = if fixed.is_empty() { 0.0 } else { 0.5 * (frame.data.dot(&frame.data) - data.dot(&data)) };
+        let mut log_evidence =
+            if fixed.is_empty() { 0.0 } else { 0.5 * (frame.data.dot(&frame.data) - data.dot(&data)) };
         let n = columns.len();
         if n == 0 {
             return Self { columns, data, cholesky: None, reduced: DVector::zeros(0), log_evidence };
@@ -184,7 +191,10 @@ impl<'a> Chosen<'a> {
     pub fn gain(&self, columns: &[Column]) -> f64 {
         let n = columns.len();
         let overlaps: Vec<DVector<f64>> = columns.iter().map(|c| self.overlap(c)).collect();
-        let y = DVector::from_iterator(n, columns.iter().zip(&overlaps).map(|(c, o)| c.dot(&self.data) - o.dot(&self.reduced)));
+        let y = DVector::from_iterator(
+            n,
+            columns.iter().zip(&overlaps).map(|(c, o)| c.dot(&self.data) - o.dot(&self.reduced)),
+        );
         let mut a = DMatrix::identity(n, n);
         for i in 0..n {
             for j in 0..=i {
@@ -220,7 +230,10 @@ impl<'a> Chosen<'a> {
     pub fn posterior(&self) -> (DVector<f64>, DMatrix<f64>) {
         match &self.cholesky {
             Some(c) => {
-                let mean = c.l_dirty().tr_solve_lower_triangular(&self.reduced).unwrap_or_else(|| DVector::zeros(self.columns.len()));
+                let mean = c
+                    .l_dirty()
+                    .tr_solve_lower_triangular(&self.reduced)
+                    .unwrap_or_else(|| DVector::zeros(self.columns.len()));
                 (mean, c.inverse())
             }
             None => (DVector::zeros(0), DMatrix::zeros(0, 0)),
