@@ -276,7 +276,7 @@ fn attitude(
     let half_width: f64 =
         if freedom.single_attitude { log_between(rng, 0.02, 0.1) } else { log_between(rng, 0.12, 0.8) }.to_radians();
     let wave: Vec<(f64, f64, f64)> = (0..3)
-        .map(|_| (half_width * between(rng, 0.5, 1.0), between(rng, 450.0, 1600.0), between(rng, 0.0, 6.28)))
+        .map(|_| (half_width * between(rng, 0.5, 1.0), between(rng, 700.0, 1700.0), between(rng, 0.0, 6.28)))
         .collect();
     let drift: Vec<(f64, f64)> = (0..3).map(|_| (between(rng, 5e3, 2e4), between(rng, 0.0, 6.28))).collect();
     let slew_s = between(rng, 1000.0, 1700.0);
@@ -304,11 +304,11 @@ fn attitude(
                 turned = None;
                 new
             };
-            // A limit cycle: nearly a triangle, its amplitude breathing slowly.
+            // A limit cycle, its amplitude breathing slowly; smooth enough for the files' 20 s grid to carry its acceleration.
             let wobble = Vector3::from_fn(|i, _| {
                 let phase = std::f64::consts::TAU * t / wave[i].1 + wave[i].2;
                 let breath = 1.0 + 0.15 * (std::f64::consts::TAU * t / drift[i].0 + drift[i].1).sin();
-                wave[i].0 * breath * (phase.sin() - phase.mul_add(3.0, 0.0).sin() / 9.0)
+                wave[i].0 * breath * phase.sin()
             });
             Rotation3::new(-wobble) * held
         })
