@@ -15,9 +15,20 @@ struct Arguments {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    /// Dumps in, product files out: the pipeline without sockets.
+    Process(command::process::Args),
+    /// Makes, seals, runs and scores concealed cases.
+    Challenge(command::challenge::Args),
+}
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match arguments.command {}
+    let done = match Arguments::parse().command {
+        Command::Process(args) => command::process::run(args),
+        Command::Challenge(args) => command::challenge::run(args),
+    };
+    done.unwrap_or_else(|error| {
+        eprintln!("oare: {error:#}");
+        command::failed()
+    })
 }

@@ -1,1 +1,6 @@
 //! Concealed cases: made, sealed, analysed blind, revealed, scored.
+
+pub mod conceal;
+pub mod run;
+pub mod score;
+pub mod seal;

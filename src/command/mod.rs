@@ -1,6 +1,10 @@
 //! The commands of `oare`, one a file: arguments in, exit code out. The work is in the library.
 
+pub mod challenge;
+
 use std::process::ExitCode;
+
+pub mod process;
 
 /// Done.
 pub const DONE: ExitCode = ExitCode::SUCCESS;

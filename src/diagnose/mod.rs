@@ -6,3 +6,4 @@ pub mod error;
 pub mod measure;
 pub mod noise;
 mod optimise;
+pub mod report;

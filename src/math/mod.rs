@@ -1,1 +1,3 @@
 //! Robust means, least squares, rotation, spectra and evidence, on slices and matrices only.
+
+pub mod robust;

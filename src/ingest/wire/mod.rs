@@ -7,6 +7,7 @@ pub mod assembly;
 pub mod coding;
 pub mod frame;
 pub mod packet;
+pub mod playback;
 pub mod record;
 pub mod sync;
 
@@ -14,5 +15,6 @@ pub use assembly::{Assembled, Assembler, Placement};
 pub use coding::LinkConfig;
 pub use frame::{FrameId, FrameRefusal, TransferFrame};
 pub use packet::{Apid, PacketId, PacketRefusal, SpacePacket};
+pub use playback::{PlaybackPart, PlaybackReader};
 pub use record::Record;
 pub use sync::{Arrival, Deframer, Direction, Polarity, Sense, Verdict};

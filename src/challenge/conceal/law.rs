@@ -1,0 +1,184 @@
+//! Laws that no catalogue lists. A sound analyser says `unexplained`, locates them, and gives none of them a physical name.
+
+use nalgebra::Vector3;
+use rand_chacha::ChaCha12Rng;
+
+use super::draw::{between, direction, log_between, pick};
+use super::flight::{Flight, LENGTH_S, STEP_S};
+use super::force::{self, Series};
+
+/// Name and plain statement of every law.
+pub const LAWS: [(&str, &str); 16] = [
+    ("unknown_eclipse_snap", "exp decay after every terminator crossing"),
+    ("unknown_quadratic_rate", "wx*wz"),
+    ("unknown_cubic", "cubic of the signal on one axis"),
+    ("unknown_local_time", "a bump at one local time"),
+    ("unknown_root_density", "square root of density, fixed in the body"),
+    ("unknown_field_squared", "magnetic field magnitude squared, fixed in the body"),
+    ("unknown_hysteresis", "temperature with hysteresis"),
+    ("unknown_clipping", "one axis saturates softly"),
+    ("unknown_echo", "a decaying push some time after every logged event"),
+    ("unknown_altitude_gate", "a push while above one height"),
+    ("unknown_region", "a push over one region of the Earth"),
+    ("unknown_rectified_rate", "magnitude of the deadband's angular acceleration"),
+    ("unknown_chirp", "an oscillation of drifting period"),
+    ("unknown_telegraph", "switching between two levels at irregular times"),
+    ("unknown_density_temperature", "density times temperature, fixed in the body"),
+    ("unknown_sawtooth", "a ramp that starts again at every waking"),
+];
+
+/// The law's signature, of arbitrary size, ng, and where it acts.
+pub fn signature(rng: &mut ChaCha12Rng, name: &str, flight: &Flight, total: &[Vector3<f64>]) -> Series {
+    let one_axis = Vector3::ith(*pick(rng, &[0, 1, 2]), 1.0);
+    let fixed = if between(rng, 0.0, 1.0) < 0.3 { one_axis } else { direction(rng) };
+    let n = flight.times_s.len();
+    let along = |shape: Vec<f64>, d: Vector3<f64>| -> Series { shape.into_iter().map(|x| d * x).collect() };
+    let axis = one_axis.imax();
+    match name {
+        "unknown_eclipse_snap" => along(snap(rng, &force::sunlit(flight)), fixed),
+        "unknown_quadratic_rate" => {
+            let [i, j] = *pick(rng, &[[0, 2], [0, 1], [1, 2]]);
+            along(flight.rate_rad_s.iter().map(|w| 1e9 * w[i] * w[j]).collect(), one_axis)
+        }
+        "unknown_cubic" => along(total.iter().map(|a| (a[axis] / 200.0).powi(3)).collect(), one_axis),
+        "unknown_local_time" => {
+            let (hour, width) = (between(rng, 0.0, 24.0), between(rng, 0.5, 1.5));
+            along((0..n).map(|k| bump(local_hour(flight, k), hour, width)).collect(), fixed)
+        }
+        "unknown_root_density" => {
+            along(force::density(flight, force::WHOLE_AIR).iter().map(|d| d.sqrt() * 1e6).collect(), fixed)
+        }
+        "unknown_field_squared" => {
+            along(force::field_t(flight).iter().map(|b| b.norm_squared() * 1e9).collect(), fixed)
+        }
+        "unknown_hysteresis" => along(play(&flight.temperature_c, between(rng, 0.3, 0.8)), fixed),
+        "unknown_clipping" => {
+            let mut sorted: Vec<f64> = total.iter().map(|a| a[axis]).collect();
+            sorted.sort_by(f64::total_cmp);
+            let level = sorted[n * 3 / 4];
+            along(total.iter().map(|a| -(a[axis] - level).max(0.0) / 10.0).collect(), one_axis)
+        }
+        "unknown_echo" => along(echo(rng, flight), fixed),
+        "unknown_altitude_gate" => {
+            let radius: Vec<f64> = flight.position_m.iter().map(Vector3::norm).collect();
+            let mut sorted = radius.clone();
+            sorted.sort_by(f64::total_cmp);
+            let gate = sorted[n * 7 / 10];
+            along(radius.iter().map(|r| f64::from(u8::from(*r > gate))).collect(), fixed)
+        }
+        "unknown_region" => {
+            let (longitude, width) = (between(rng, -180.0, 180.0), between(rng, 25.0, 45.0));
+            along((0..n).map(|k| region(flight, k, longitude, width)).collect(), fixed)
+        }
+        "unknown_rectified_rate" => {
+            along(flight.rate_change_rad_s2.iter().map(|w| (w[axis].abs() * 1e7).min(30.0)).collect(), fixed)
+        }
+        "unknown_chirp" => {
+            let (period, drift) = (log_between(rng, 500.0, 4000.0), between(rng, 0.3, 0.8));
+            let shape = (0..n).map(|k| {
+                let x = k as f64 * STEP_S / LENGTH_S;
+                (std::f64::consts::TAU * LENGTH_S / period * (x + 0.5 * drift * x * x)).sin()
+            });
+            along(shape.collect(), fixed)
+        }
+        "unknown_telegraph" => along(telegraph(rng, n), fixed),
+        "unknown_density_temperature" => {
+            let density = force::density(flight, force::WHOLE_AIR);
+            along((0..n).map(|k| density[k] * 1e11 * (flight.temperature_c[k] - 4.0)).collect(), fixed)
+        }
+        _ => along(sawtooth(flight), fixed),
+    }
+}
+
+fn snap(rng: &mut ChaCha12Rng, lit: &[f64]) -> Vec<f64> {
+    let keep = (-STEP_S / between(rng, 200.0, 700.0)).exp();
+    let mut state: f64 = 0.0;
+    let mut before = lit[0] > 0.5;
+    lit.iter()
+        .map(|lit| {
+            let now = *lit > 0.5;
+            state = if now == before {
+                state * keep
+            } else if now {
+                1.0
+            } else {
+                -0.6
+            };
+            before = now;
+            state
+        })
+        .collect()
+}
+
+fn local_hour(flight: &Flight, k: usize) -> f64 {
+    let (r, s) = (flight.position_m[k], force::sun_unit(flight.times_s[k]));
+    (12.0 + (r.y.atan2(r.x) - s.y.atan2(s.x)).to_degrees() / 15.0).rem_euclid(24.0)
+}
+
+fn bump(hour: f64, centre: f64, width: f64) -> f64 {
+    let away = (hour - centre + 36.0).rem_euclid(24.0) - 12.0;
+    (-0.5 * (away / width).powi(2)).exp()
+}
+
+fn region(flight: &Flight, k: usize, longitude_deg: f64, width_deg: f64) -> f64 {
+    let r = flight.position_m[k];
+    let turned = (r.y.atan2(r.x) - super::flight::EARTH_RATE_RAD_S * (flight.times_s[k] - flight.start_s)).to_degrees();
+    let away = (turned - longitude_deg + 540.0).rem_euclid(360.0) - 180.0;
+    f64::from(u8::from(away.abs() < width_deg && r.z < 0.0))
+}
+
+/// A play operator: follows the temperature only beyond a slack.
+fn play(temperature_c: &[f64], slack_c: f64) -> Vec<f64> {
+    let mut state = temperature_c[0];
+    let out: Vec<f64> = temperature_c
+        .iter()
+        .map(|t| {
+            state = state.clamp(t - slack_c / 2.0, t + slack_c / 2.0);
+            state
+        })
+        .collect();
+    // What remains beside the temperature itself is the hysteresis; a tenth of the linear part stays in it.
+    out.iter().zip(temperature_c).map(|(s, t)| (s - t) + 0.1 * t).collect()
+}
+
+fn echo(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
+    let (delay, tau) = (between(rng, 900.0, 4500.0), between(rng, 400.0, 2500.0));
+    let kinds: Vec<&str> = ["water_dump", "evaporator", "crew_sleep"]
+        .into_iter()
+        .filter(|k| flight.events.iter().any(|e| e.kind == *k))
+        .collect();
+    let kind = *pick(rng, &kinds);
+    let mut shape = vec![0.0; flight.times_s.len()];
+    for event in flight.events.iter().filter(|e| e.kind == kind) {
+        let from = event.clock_s + event.duration_s + delay;
+        for (x, t) in shape.iter_mut().zip(&flight.times_s).filter(|(_, t)| **t >= from) {
+            *x += (-(t - from) / tau).exp();
+        }
+    }
+    shape
+}
+
+fn telegraph(rng: &mut ChaCha12Rng, n: usize) -> Vec<f64> {
+    let mean_steps = between(rng, 1200.0, 9000.0) / STEP_S;
+    let (mut up, mut left) = (false, 0.0);
+    (0..n)
+        .map(|_| {
+            left -= 1.0;
+            if left <= 0.0 {
+                up = !up;
+                left = mean_steps * between(rng, 0.3, 1.7);
+            }
+            f64::from(u8::from(up))
+        })
+        .collect()
+}
+
+fn sawtooth(flight: &Flight) -> Vec<f64> {
+    let wake: Vec<f64> =
+        flight.events.iter().filter(|e| e.kind == "crew_sleep").map(|e| e.clock_s + e.duration_s).collect();
+    let ramp = |t: &f64| {
+        let last = wake.iter().filter(|w| **w <= *t).fold(flight.start_s - 40_000.0, |a, b| a.max(*b));
+        ((t - last) / 57_600.0).min(1.5)
+    };
+    flight.times_s.iter().map(ramp).collect()
+}

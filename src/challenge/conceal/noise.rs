@@ -1,0 +1,181 @@
+//! The noise of a drawn record, and the exact whitening that belongs to it.
+//!
+//! Windows of 50 s every 25 s: each is the mean of two halves of white noise, `(h_k + h_(k-1)) / sqrt 2`, louder while the crew is
+//! awake, with a little red noise in proportion, and on some records slow noise (minutes to hours) beside it. The same state
+//! model draws the noise and, as a Kalman filter, whitens signatures: SNR here is the true matched filter's, not an estimate.
+
+use rand_chacha::ChaCha12Rng;
+
+use super::draw::{between, log_between, normal};
+
+/// Step of the window grid, s.
+pub const WINDOW_STEP_S: f64 = 25.0;
+
+/// What the noise of one record is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Noise {
+    /// Standard deviation awake, per axis, ng, without the slow part.
+    pub awake_ng: [f64; 3],
+    /// Asleep over awake.
+    pub asleep: f64,
+    /// Share of the variance that is red.
+    pub red_share: f64,
+    /// Its correlation time, s.
+    pub red_s: f64,
+    /// Slow noise per axis, ng; zero on most records.
+    pub slow_ng: [f64; 3],
+    /// Its correlation time, s.
+    pub slow_s: f64,
+}
+
+impl Noise {
+    /// Draws one; `slow` puts up to 30 ng of noise with 5 min to 3 h of memory beside the rest.
+    pub fn draw(rng: &mut ChaCha12Rng, slow: bool) -> Self {
+        let x_ng = log_between(rng, 55.0, 330.0);
+        let awake_ng = [x_ng, x_ng * between(rng, 0.45, 0.50), x_ng * between(rng, 0.56, 0.62)];
+        let slow_ng = std::array::from_fn(|_| if slow { between(rng, 5.0, 30.0) } else { 0.0 });
+        Self {
+            awake_ng,
+            asleep: between(rng, 0.55, 0.68),
+            red_share: between(rng, 0.0, 0.08),
+            red_s: log_between(rng, 100.0, 1500.0),
+            slow_ng,
+            slow_s: log_between(rng, 300.0, 10_800.0),
+        }
+    }
+
+    /// One series of `windows` values for an axis; `awake` in 0..=1 scales between the two levels.
+    pub fn series(&self, rng: &mut ChaCha12Rng, axis: usize, awake: &[f64]) -> Vec<f64> {
+        let (white, red) = ((1.0 - self.red_share).sqrt(), self.red_share.sqrt());
+        let (red_keep, slow_keep) = (keep(self.red_s), keep(self.slow_s));
+        let (mut before, mut red_now, mut slow_now) = (normal(rng), normal(rng), normal(rng));
+        let mut series = Vec::with_capacity(awake.len());
+        for awake in awake {
+            let half = normal(rng);
+            red_now = red_keep * red_now + (1.0 - red_keep * red_keep).sqrt() * normal(rng);
+            slow_now = slow_keep * slow_now + (1.0 - slow_keep * slow_keep).sqrt() * normal(rng);
+            let quick = white * (half + before) / 2f64.sqrt() + red * red_now;
+            series.push(self.level_ng(axis, *awake) * quick + self.slow_ng[axis] * slow_now);
+            before = half;
+        }
+        series
+    }
+
+    /// Standard deviation of the quick part, ng.
+    pub fn level_ng(&self, axis: usize, awake: f64) -> f64 {
+        self.awake_ng[axis] * (self.asleep + (1.0 - self.asleep) * awake)
+    }
+
+    /// The whitening of one axis: for the windows present (`kept`) of the whole grid.
+    pub fn whitening(&self, axis: usize, awake: &[f64], kept: &[bool]) -> Whitening {
+        // State: h_k, h_(k-1), red, slow, all of unit variance.
+        let (white, red) = ((1.0 - self.red_share).sqrt() / 2f64.sqrt(), self.red_share.sqrt());
+        let keep = [keep(self.red_s), keep(self.slow_s)];
+        let mut p = [[0.0; 4]; 4];
+        for (i, row) in p.iter_mut().enumerate() {
+            row[i] = 1.0;
+        }
+        let steps = awake
+            .iter()
+            .zip(kept)
+            .map(|(awake, kept)| {
+                p = predict(&p, keep);
+                let level = self.level_ng(axis, *awake);
+                let h = [level * white, level * white, level * red, self.slow_ng[axis]];
+                if !kept {
+                    return Step { h, gain: [0.0; 4], sigma: f64::INFINITY };
+                }
+                let ph: [f64; 4] = std::array::from_fn(|i| (0..4).map(|j| p[i][j] * h[j]).sum());
+                // A thousandth of the level squared keeps the filter well-posed where the halves' sum is known exactly.
+                let variance = (0..4).map(|i| h[i] * ph[i]).sum::<f64>() + 1e-4 * level * level;
+                let gain = ph.map(|x| x / variance);
+                for (i, row) in p.iter_mut().enumerate() {
+                    for (j, cell) in row.iter_mut().enumerate() {
+                        *cell -= gain[i] * ph[j];
+                    }
+                }
+                Step { h, gain, sigma: variance.sqrt() }
+            })
+            .collect();
+        Whitening { steps, keep }
+    }
+}
+
+/// A linear map from a series on the window grid to one of unit variance on the kept windows.
+#[derive(Debug, Clone)]
+pub struct Whitening {
+    steps: Vec<Step>,
+    keep: [f64; 2],
+}
+
+#[derive(Debug, Clone)]
+struct Step {
+    h: [f64; 4],
+    gain: [f64; 4],
+    sigma: f64,
+}
+
+impl Whitening {
+    /// Innovations over their standard deviation, kept windows only.
+    pub fn apply(&self, series: &[f64]) -> Vec<f64> {
+        let mut state = [0.0; 4];
+        let mut out = Vec::with_capacity(series.len());
+        for (step, value) in self.steps.iter().zip(series) {
+            state = [0.0, state[0], self.keep[0] * state[2], self.keep[1] * state[3]];
+            if step.sigma.is_finite() {
+                let expected: f64 = (0..4).map(|i| step.h[i] * state[i]).sum();
+                let innovation = value - expected;
+                for (state, gain) in state.iter_mut().zip(step.gain) {
+                    *state += gain * innovation;
+                }
+                out.push(innovation / step.sigma);
+            }
+        }
+        out
+    }
+}
+
+fn keep(time_s: f64) -> f64 {
+    (-WINDOW_STEP_S / time_s).exp()
+}
+
+/// Covariance one window on: the first half becomes the one before, a fresh one arrives, the slow states relax.
+fn predict(p: &[[f64; 4]; 4], keep: [f64; 2]) -> [[f64; 4]; 4] {
+    let [r, s] = keep;
+    let mut q = [[0.0; 4]; 4];
+    q[0][0] = 1.0;
+    q[1][1] = p[0][0];
+    for (i, k) in [(2, r), (3, s)] {
+        q[1][i] = k * p[0][i];
+        q[i][1] = q[1][i];
+        q[i][i] = k * k * p[i][i] + 1.0 - k * k;
+    }
+    q[2][3] = r * s * p[2][3];
+    q[3][2] = q[2][3];
+    q
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    #[test]
+    fn whitened_noise_is_white_and_of_unit_variance() {
+        let mut rng = ChaCha12Rng::seed_from_u64(1);
+        let noise = Noise::draw(&mut rng, true);
+        let windows = 40_000;
+        let awake: Vec<f64> = (0..windows).map(|k| f64::from(u8::from(k % 3456 > 1152))).collect();
+        let kept: Vec<bool> = (0..windows).map(|k| k % 600 > 38).collect();
+        let series = noise.series(&mut rng, 0, &awake);
+        let white = noise.whitening(0, &awake, &kept).apply(&series);
+        let n = white.len() as f64;
+        let variance = white.iter().map(|x| x * x).sum::<f64>() / n;
+        // The regularising 1e-4 takes its share where the filter would know a half exactly; six standard errors.
+        assert!((variance - 1.0).abs() < 6.0 * (2.0 / n).sqrt() + 0.01, "{variance}");
+        for lag in [1, 2, 5, 40] {
+            let c = white.iter().zip(&white[lag..]).map(|(a, b)| a * b).sum::<f64>() / n;
+            assert!(c.abs() < 6.0 / n.sqrt() + 0.01, "lag {lag}: {c}");
+        }
+    }
+}

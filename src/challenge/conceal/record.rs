@@ -1,0 +1,213 @@
+//! From a drawn flight to the files of a case, in the case format's columns and roundings.
+
+use std::fmt::Write;
+
+use nalgebra::Vector3;
+use rand_chacha::ChaCha12Rng;
+
+use super::draw::{between, log_between, normal, pick};
+use super::flight::{FILE_STRIDE, Flight, LENGTH_S, MARGIN_S, STEP_S};
+use super::force;
+use super::noise::{Noise, WINDOW_STEP_S};
+
+/// Half of a window, in points of the 5 s grid.
+const HALF_WINDOW: usize = 5;
+
+/// The grid of window centres, s: every 25 s, the first 25 s into the recording.
+pub fn centres_s(flight: &Flight) -> Vec<f64> {
+    let windows = (LENGTH_S / WINDOW_STEP_S) as usize - 1;
+    (0..windows).map(|k| flight.start_s + WINDOW_STEP_S * (k + 1) as f64).collect()
+}
+
+/// Mean over the 50 s window about each centre (trapezoid on the 5 s grid), one series per axis.
+pub fn window_means(flight: &Flight, series: &[Vector3<f64>]) -> [Vec<f64>; 3] {
+    let windows = centres_s(flight).len();
+    let first = ((MARGIN_S + WINDOW_STEP_S) / STEP_S) as usize;
+    let stride = (WINDOW_STEP_S / STEP_S) as usize;
+    std::array::from_fn(|axis| {
+        (0..windows)
+            .map(|w| {
+                let k = first + w * stride;
+                let inner: f64 = (k - HALF_WINDOW + 1..k + HALF_WINDOW).map(|j| series[j][axis]).sum();
+                let ends = 0.5 * (series[k - HALF_WINDOW][axis] + series[k + HALF_WINDOW][axis]);
+                (inner + ends) / (2 * HALF_WINDOW) as f64
+            })
+            .collect()
+    })
+}
+
+/// 1 awake, 0 asleep, at each window.
+pub fn awake(flight: &Flight) -> Vec<f64> {
+    let asleep = |t: f64| {
+        let nights = flight.events.iter().filter(|e| e.kind == "crew_sleep");
+        nights.into_iter().any(|e| t >= e.clock_s && t < e.clock_s + e.duration_s)
+    };
+    centres_s(flight).into_iter().map(|t| if asleep(t) { 0.0 } else { 1.0 }).collect()
+}
+
+/// Which windows arrive: calibrations every 4.18 h take 16 or 42 minutes, and a few stretches are lost.
+pub fn kept(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<bool> {
+    let centres = centres_s(flight);
+    let mut lost: Vec<(f64, f64)> = (0..9)
+        .map(|j| {
+            let from = flight.start_s + 600.0 + 15_060.0 * f64::from(j);
+            (from, from + if j % 3 == 0 { 2500.0 } else { 950.0 })
+        })
+        .collect();
+    for _ in 0..*pick(rng, &[0, 1, 1, 2, 3]) {
+        let from = flight.start_s + between(rng, 0.0, LENGTH_S);
+        lost.push((from, from + log_between(rng, 600.0, 3200.0)));
+    }
+    centres.iter().map(|t| !lost.iter().any(|(from, to)| t > from && t < to)).collect()
+}
+
+/// The texts of a case, by file name.
+pub struct Texts {
+    /// `case.toml`, `recording.csv`, `simulation.csv`, `ancillary.csv`, `events.csv`.
+    pub files: Vec<(String, String)>,
+    /// Standard deviation of the noise actually drawn, ng.
+    pub noise_ng: [f64; 3],
+}
+
+/// What the writer needs beside the flight.
+pub struct Parts<'a> {
+    /// Identity of the case.
+    pub id: &'a str,
+    /// What the simulation expects, ng.
+    pub simulated: &'a [Vector3<f64>],
+    /// What the sensor feels, ng.
+    pub felt: &'a [Vector3<f64>],
+    /// Density the simulation used, kg/m^3.
+    pub density_kg_m3: &'a [f64],
+    /// The noise.
+    pub noise: &'a Noise,
+    /// Windows that arrive.
+    pub kept: &'a [bool],
+}
+
+/// Writes the files of a case.
+pub fn texts(rng: &mut ChaCha12Rng, flight: &Flight, parts: &Parts) -> Texts {
+    let awake = awake(flight);
+    let means = window_means(flight, parts.felt);
+    let noise: [Vec<f64>; 3] = std::array::from_fn(|axis| parts.noise.series(rng, axis, &awake));
+    let noise_ng = std::array::from_fn(|axis| {
+        let kept: Vec<f64> = noise[axis].iter().zip(parts.kept).filter(|(_, k)| **k).map(|(x, _)| *x).collect();
+        let mean = kept.iter().sum::<f64>() / kept.len() as f64;
+        (kept.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / kept.len() as f64).sqrt()
+    });
+    let bias = Vector3::from_fn(|_, _| 60.0 * normal(rng));
+    let dev = deviations(rng, parts.noise, &awake);
+    let mut recording = String::from("clock_s,ax_ng,ay_ng,az_ng,dev_x_ng,dev_y_ng,dev_z_ng\n");
+    for (w, t) in centres_s(flight).into_iter().enumerate().filter(|(w, _)| parts.kept[*w]) {
+        let a: [f64; 3] = std::array::from_fn(|i| means[i][w] + noise[i][w] + bias[i]);
+        let d: [f64; 3] = std::array::from_fn(|i| dev[i][w]);
+        row(&mut recording, &format!("{t:.1}"), &[(&a, 2), (&d, 1)]);
+    }
+    let files = vec![
+        ("case.toml".to_string(), case_toml(parts.id, flight)),
+        ("recording.csv".to_string(), recording),
+        ("simulation.csv".to_string(), simulation(flight, parts.simulated)),
+        ("ancillary.csv".to_string(), ancillary(flight, parts.density_kg_m3)),
+        ("events.csv".to_string(), events(flight)),
+    ];
+    Texts { files, noise_ng }
+}
+
+/// Average deviation in each window: about four times the mean's noise, and as scattered as on the open cases.
+fn deviations(rng: &mut ChaCha12Rng, noise: &Noise, awake: &[f64]) -> [Vec<f64>; 3] {
+    std::array::from_fn(|axis| {
+        let mut before = between(rng, 0.1, 1.9);
+        awake
+            .iter()
+            .map(|awake| {
+                let half = between(rng, 0.1, 1.9);
+                let dev = 4.0 * noise.level_ng(axis, *awake) * 0.5 * (half + before);
+                before = half;
+                dev
+            })
+            .collect()
+    })
+}
+
+fn row(text: &mut String, first: &str, groups: &[(&[f64], usize)]) {
+    text.push_str(first);
+    for (values, digits) in groups {
+        for value in *values {
+            // Writing to a String cannot fail.
+            let _ = write!(text, ",{value:.digits$}");
+        }
+    }
+    text.push('\n');
+}
+
+fn file_points(flight: &Flight) -> impl Iterator<Item = (usize, String)> {
+    (0..flight.times_s.len()).step_by(FILE_STRIDE).map(|k| (k, format!("{:.1}", flight.times_s[k])))
+}
+
+fn simulation(flight: &Flight, simulated: &[Vector3<f64>]) -> String {
+    let mut text = String::from("clock_s,ax_ng,ay_ng,az_ng\n");
+    for (k, t) in file_points(flight) {
+        row(&mut text, &t, &[(simulated[k].as_slice(), 3)]);
+    }
+    text
+}
+
+fn ancillary(flight: &Flight, density_kg_m3: &[f64]) -> String {
+    let mut text = String::from(
+        "clock_s,rx_m,ry_m,rz_m,vx_m_s,vy_m_s,vz_m_s,qw,qx,qy,qz,wx_rad_s,wy_rad_s,wz_rad_s,density_kg_m3,temperature_c\n",
+    );
+    for (k, t) in file_points(flight) {
+        let q = nalgebra::UnitQuaternion::from_rotation_matrix(&flight.body[k]);
+        let w = flight.rate_rad_s[k];
+        row(
+            &mut text,
+            &t,
+            &[(flight.position_m[k].as_slice(), 2), (flight.velocity_m_s[k].as_slice(), 5), (&[q.w, q.i, q.j, q.k], 9)],
+        );
+        text.pop();
+        let _ = writeln!(
+            text,
+            ",{:.9e},{:.9e},{:.9e},{:.5e},{:.3}",
+            w.x, w.y, w.z, density_kg_m3[k], flight.temperature_c[k]
+        );
+    }
+    text
+}
+
+fn events(flight: &Flight) -> String {
+    let mut text = String::from("clock_s,duration_s,kind,detail\n");
+    for event in &flight.events {
+        let _ = writeln!(text, "{:.1},{:.1},{},", event.clock_s, event.duration_s, event.kind);
+    }
+    text
+}
+
+fn case_toml(id: &str, flight: &Flight) -> String {
+    let v = &flight.vehicle;
+    let (a, s) = (v.area_m2, v.sensor_offset_m);
+    format!(
+        "[case]\nid = \"{id}\"\nepoch_utc = \"{}\"\nliftoff_clock_s = 13800\nstart_s = {:.1}\nend_s = {:.1}\n\n\
+         [vehicle]\nmass_kg = {:.1}\ndrag_coefficient = {:.1}\narea_m2 = [{:.1}, {:.1}, {:.1}]\n\
+         sensor_offset_m = [{:.4}, {:.4}, {:.4}]\nsrp_coefficient = 1.3\n\n\
+         [simulation]\nfile = \"simulation.csv\"\nincludes = [\"gravity_gradient\", \"rotation\", \"aerodynamic_drag\"]\n\n\
+         [recording]\nfile = \"recording.csv\"\nkind = \"acceleration_csv\"\n\n\
+         [ancillary]\nfile = \"ancillary.csv\"\nevents = \"events.csv\"\n",
+        Flight::mission().epoch_utc,
+        flight.start_s,
+        flight.end_s(),
+        v.mass_kg,
+        v.drag_coefficient,
+        a.x,
+        a.y,
+        a.z,
+        s.x,
+        s.y,
+        s.z,
+    )
+}
+
+/// Density of a simulation's air on the grid, for the ancillary file.
+pub fn simulated_density(flight: &Flight, lacks_bulge: bool) -> Vec<f64> {
+    let bulge = if lacks_bulge { 0.0 } else { 1.0 };
+    force::density(flight, force::Air { bulge, ..force::WHOLE_AIR })
+}

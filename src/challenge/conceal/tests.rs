@@ -1,0 +1,64 @@
+//! The generator's own claims, without an analyser.
+
+use super::*;
+
+fn column(text: &str, name: &str) -> Vec<f64> {
+    let mut lines = text.lines();
+    let place = lines.next().unwrap().split(',').position(|h| h == name).unwrap();
+    lines.map(|line| line.split(',').nth(place).unwrap().parse().unwrap()).collect()
+}
+
+fn file<'a>(case: &'a Concealed, name: &str) -> &'a str {
+    &case.files.iter().find(|(n, _)| n == name).unwrap().1
+}
+
+#[test]
+fn the_same_seed_draws_the_same_case_and_another_seed_another() {
+    let (a, b, c) = (draw(Kind::One, 5), draw(Kind::One, 5), draw(Kind::One, 6));
+    assert_eq!(a.files, b.files);
+    assert_eq!(a.truth, b.truth);
+    assert_ne!(a.files, c.files);
+}
+
+#[test]
+fn a_clean_record_differs_from_its_simulation_by_the_noise_and_a_constant() {
+    let case = draw(Kind::Clean, 1);
+    let (clock, grid) =
+        (column(file(&case, "recording.csv"), "clock_s"), column(file(&case, "simulation.csv"), "clock_s"));
+    for (axis, name) in ["ax_ng", "ay_ng", "az_ng"].into_iter().enumerate() {
+        let (recorded, simulated) =
+            (column(file(&case, "recording.csv"), name), column(file(&case, "simulation.csv"), name));
+        let mut left: Vec<f64> = clock
+            .iter()
+            .zip(&recorded)
+            .map(|(t, a)| {
+                let mean = |t: f64| effect::at(&simulated, (t - grid[0]) / 20.0);
+                a - (0..=10).map(|j| mean(t - 25.0 + 5.0 * f64::from(j))).sum::<f64>() / 11.0
+            })
+            .collect();
+        let mean = left.iter().sum::<f64>() / left.len() as f64;
+        left.iter_mut().for_each(|x| *x -= mean);
+        let rms = (left.iter().map(|x| x * x).sum::<f64>() / left.len() as f64).sqrt();
+        // The 20 s grid and the eleven points cost less than 1 % of the noise.
+        assert!((rms / case.truth.noise_ng[axis] - 1.0).abs() < 0.01, "{rms} against {}", case.truth.noise_ng[axis]);
+    }
+}
+
+#[test]
+fn drawn_effects_have_a_fair_snr_and_are_not_confused_with_themselves() {
+    for (seed, id) in effect::IDS.iter().enumerate().step_by(3) {
+        let order = Order { kind: Kind::One, seed: seed as u64, only: Some(id), other_physics: seed % 2 == 0 };
+        let case = draw_order(&order);
+        let snr = case.truth.snr[*id];
+        assert!(snr > 3.0 && snr < 400.0, "{id}: {snr}");
+        let left = case.truth.snr_left[*id];
+        // Continuous onsets and lags leave something against the grid's; a third at most.
+        assert!(left < 0.4 * snr, "{id}: {left} left of {snr}");
+    }
+}
+
+#[test]
+fn a_single_attitude_question_has_more_than_one_answer() {
+    let case = draw(Kind::Single, 2);
+    assert!(!case.truth.confusable.is_empty(), "{:?}", case.truth);
+}

@@ -1,0 +1,99 @@
+//! The sentence a flight engineer needs, from the answer.
+
+use crate::diagnose::answer::{Diagnosis, Verdict};
+
+/// One or two sentences: what is missing, how large it is, what to do.
+pub fn sentence(d: &Diagnosis) -> String {
+    match d.verdict {
+        Verdict::Consistent => consistent(d),
+        Verdict::Explained => explained(d),
+        Verdict::Ambiguous => ambiguous(d),
+        Verdict::Unexplained => unexplained(d),
+    }
+}
+
+fn consistent(d: &Diagnosis) -> String {
+    let loosest = d.upper_limits.iter().max_by(|a, b| a.limit_ng.total_cmp(&b.limit_ng));
+    let limit = loosest.map_or(String::new(), |l| {
+        format!(" The least well bounded effect, {}, stays below {} ng rms (95 %).", words(&l.id), figure(l.limit_ng))
+    });
+    format!("The recording agrees with the simulation within its noise: there is nothing to correct.{limit}")
+}
+
+fn explained(d: &Diagnosis) -> String {
+    let names: Vec<String> = d
+        .effects
+        .iter()
+        .map(|e| {
+            let size = e.rms_ng.map_or(String::new(), |r| format!(" ({} ng rms)", figure(norm(r))));
+            format!("{}{size}", lower_first(&e.name))
+        })
+        .collect();
+    let gain = d.fit.as_ref().map_or(String::new(), |fit| {
+        format!(
+            " With it, the misfit on data the fit has not seen falls from {} to {} ng, against noise of {} ng.",
+            figure(norm(fit.held_out.before_rms_ng)),
+            figure(norm(fit.held_out.after_rms_ng)),
+            figure(norm(fit.noise_floor_ng))
+        )
+    });
+    let why = d.effects.first().map_or(String::new(), |e| format!(" {}", e.why.trim()));
+    format!("The simulation lacks {}.{why}{gain}", listed(&names, "and"))
+}
+
+fn ambiguous(d: &Diagnosis) -> String {
+    let sets: Vec<String> = d
+        .cannot_tell_apart
+        .iter()
+        .map(|set| set.iter().map(|id| words(id)).collect::<Vec<_>>().join(" with "))
+        .collect();
+    let next = d.separating_observation.as_ref().map_or(String::new(), |s| format!(" To decide: {}", s.text.trim()));
+    format!(
+        "The simulation lacks something, and this recording cannot tell whether it is {}.{next}",
+        listed(&sets, "or")
+    )
+}
+
+fn unexplained(d: &Diagnosis) -> String {
+    let axes =
+        if d.located.axes.is_empty() { String::new() } else { format!(" on {}", listed(&d.located.axes, "and")) };
+    let follows = d.located.covariates.first().map_or(String::new(), |c| format!(", following {}", words(&c.name)));
+    let formula = d.hypothesis.as_ref().map_or(String::new(), |h| {
+        format!(" A formula that describes it (a description, not a cause): {} ({}).", h.formula, h.unit)
+    });
+    format!(
+        "Something acts{axes}{follows} that no effect of the catalogue explains; do not correct for it by name.{formula}"
+    )
+}
+
+/// An id in words.
+pub fn words(id: &str) -> String {
+    id.replace('_', " ")
+}
+
+/// A number with two significant digits, no exponent.
+pub fn figure(x: f64) -> String {
+    match x.abs() {
+        a if a >= 100.0 => format!("{x:.0}"),
+        a if a >= 10.0 => format!("{x:.1}"),
+        a if a >= 1.0 => format!("{x:.2}"),
+        _ => format!("{x:.3}"),
+    }
+}
+
+fn norm(v: [f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn lower_first(name: &str) -> String {
+    let mut letters = name.chars();
+    letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
+}
+
+fn listed(items: &[String], last: &str) -> String {
+    match items {
+        [] => "something".into(),
+        [only] => only.clone(),
+        [head @ .., tail] => format!("{} {last} {tail}", head.join(", ")),
+    }
+}

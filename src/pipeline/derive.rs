@@ -1,0 +1,114 @@
+//! A window and a calibration make a product.
+
+use sha2::{Digest, Sha256};
+
+use super::axes::{OareVector, errors_to_body, to_body};
+use super::calibration::{Calibrated, Calibration, Measured, RangeCorrection};
+use super::product::{BodyAcceleration, Product, Revision};
+use super::settings::WindowPolicy;
+use super::window::{AxisWindow, WINDOW_TENTHS, Window};
+use crate::telemetry::{Axis, Quality, Range};
+
+/// The product of a window by a calibration, or without one.
+pub fn product(
+    window: &Window,
+    calibration: Option<&Calibration>,
+    corrections: &[RangeCorrection],
+    policy: &WindowPolicy,
+) -> Product {
+    let mut quality = window.quality;
+    let mut ranges = [None; 3];
+    let mut calibrated = [None; 3];
+    for axis in Axis::ALL {
+        let Some(axis_window) = &window.axes[axis.index()] else { continue };
+        let (range, corrected) = true_range(window, axis, axis_window.range, corrections, &mut quality);
+        ranges[axis.index()] = Some(range);
+        quality = quality.with_if(Quality::RANGE_CORRECTED, corrected);
+        let measured = measured(window, axis, range, axis_window, policy);
+        calibrated[axis.index()] = calibration.and_then(|calibration| calibration.apply(&measured));
+    }
+    let acceleration = match calibrated {
+        [Some(x), Some(y), Some(z)] => Some(in_body_axes([x, y, z])),
+        _ => None,
+    };
+    let estimates = window.axes.map(|axis| axis.map(|axis| axis.estimate));
+    let extrapolated = calibrated.iter().flatten().any(|axis| axis.extrapolated);
+    let measurable = window.axes.iter().all(Option::is_some);
+    let quality = quality
+        .with_if(Quality::UNCALIBRATED, measurable && acceleration.is_none())
+        .with_if(Quality::EXTRAPOLATED, extrapolated && acceleration.is_some());
+    let mut product = Product {
+        start: window.start,
+        acceleration,
+        q: estimates.map(|estimate| estimate.and_then(|estimate| estimate.q)),
+        trim: estimates.map(|estimate| estimate.map(|estimate| estimate.trim)),
+        range: ranges,
+        samples: window.samples,
+        temperature_c: window.temperature_c.is_finite().then_some(window.temperature_c),
+        mode: window.mode,
+        quality,
+        calibration: calibration.map_or(0, |calibration| calibration.version),
+        revision: Revision(0),
+        known_since: window.known_since.max(calibration.map_or(window.known_since, |c| c.known_since)),
+    };
+    product.revision = revision(window, &product);
+    product
+}
+
+/// The range the sensor was in; a window at the edge of a correction holds samples of both.
+fn true_range(
+    window: &Window,
+    axis: Axis,
+    reported: Range,
+    corrections: &[RangeCorrection],
+    quality: &mut Quality,
+) -> (Range, bool) {
+    let end = window.start.plus_tenths(WINDOW_TENTHS);
+    let touching =
+        corrections.iter().find(|c| c.axis == axis && c.reported == reported && c.from < end && c.to > window.start);
+    let Some(correction) = touching else { return (reported, false) };
+    let whole = correction.from <= window.start && correction.to >= end;
+    *quality = quality.with_if(Quality::RANGE_MIXED, !whole);
+    let centre = window.start.plus_tenths(WINDOW_TENTHS / 2);
+    match correction.from <= centre && centre < correction.to {
+        true => (correction.actual, true),
+        false => (reported, false),
+    }
+}
+
+fn measured(window: &Window, axis: Axis, range: Range, counts: &AxisWindow, policy: &WindowPolicy) -> Measured {
+    Measured {
+        axis,
+        range,
+        clock_s: window.centre_s(),
+        temperature_c: window.temperature_c,
+        trimmed_counts: counts.estimate.mean,
+        mean_counts: counts.estimate.plain_mean,
+        noise_counts: counts.estimate.independent_standard_error() * policy.correlated_samples.sqrt(),
+    }
+}
+
+fn in_body_axes(axes: [Calibrated; 3]) -> BodyAcceleration {
+    let of = |figure: fn(&Calibrated) -> f64| OareVector([0, 1, 2].map(|axis| figure(&axes[axis])));
+    BodyAcceleration {
+        trimmed_ng: to_body(of(|axis| axis.trimmed_ng)),
+        mean_ng: to_body(of(|axis| axis.mean_ng)),
+        sigma_ng: errors_to_body(of(|axis| axis.sigma_ng)),
+        sigma_sys_ng: errors_to_body(of(|axis| axis.sigma_sys_ng)),
+    }
+}
+
+/// Hash of the samples and of every figure they were turned into.
+fn revision(window: &Window, product: &Product) -> Revision {
+    let mut digest = Sha256::new_with_prefix(window.digest);
+    digest.update(product.calibration.to_le_bytes());
+    if let Some(acceleration) = &product.acceleration {
+        let vectors = [acceleration.trimmed_ng, acceleration.mean_ng, acceleration.sigma_ng, acceleration.sigma_sys_ng];
+        vectors.iter().flat_map(|vector| vector.0).for_each(|figure| digest.update(figure.to_le_bytes()));
+    }
+    digest.update(product.range.map(|range| range.map_or(3, |range| range.index() as u8)));
+    let octets: [u8; 32] = digest.finalize().into();
+    Revision(u64::from_be_bytes([
+        octets[0], octets[1], octets[2], octets[3], octets[4], octets[5], octets[6], octets[7],
+    ]))
+}
