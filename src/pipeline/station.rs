@@ -263,7 +263,13 @@ impl Station {
         if !std::mem::take(&mut self.calibration_touched) {
             return false;
         }
-        let derived = calibration::derive(&self.archive, &self.settings, self.known.as_ref());
+        let derived = calibration::derive(
+            &self.archive,
+            &self.windows,
+            &self.settings,
+            self.known.as_ref(),
+            Some(&self.derived),
+        );
         let changed =
             derived.current() != self.derived.current() || derived.range_corrections != self.derived.range_corrections;
         for anomaly in derived.anomalies.iter().filter(|anomaly| !self.derived.anomalies.contains(anomaly)) {
