@@ -121,9 +121,9 @@ pub fn version_json(calibration: &Calibration) -> Value {
         }
         axes.insert(axis.letter().into(), Value::Object(ranges));
     }
-    let noise = calibration.noise.map(|noise| {
-        json!({"factor": noise.factor, "half_drift_75_s_ng": noise.half_drift_variance_ng2.map(f64::sqrt)})
-    });
+    let noise = calibration.noise.map(
+        |noise| json!({"factor": noise.factor, "half_drift_75_s_ng": noise.half_drift_variance_ng2.map(f64::sqrt)}),
+    );
     json!({
         "version": calibration.version,
         "known_since_clock_s": calibration.known_since.seconds(),

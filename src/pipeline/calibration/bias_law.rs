@@ -2,7 +2,7 @@
 //! bias(t, T) = A1 + A2 exp(-t/t0) + A3 exp(-t/t1) + A4 T [Rice 1996], t in hours since lift-off.
 //!
 //! Six figures cannot be had from six hours. The fit is therefore regularised by what was seen before: every coefficient but
-//! A1 is expected to be no larger than about twice its published size, and the time constants to lie where the published ones
+//! A1 is expected to be about as large as its published size at most, and the time constants to lie where the published ones
 //! lie. What the measurements do not determine stays at that expectation *with its width in the covariance*, so that the band
 //! widens where nothing is known instead of a law running wild. Which of the figures the measurements themselves carry is
 //! told by [`BiasFit::carried`].
@@ -60,9 +60,9 @@ impl Expectation {
         [[20.58, 8.55, 0.2], [30.08, 15.86, 0.4], [385.1, 183.3, 4.89]],
     ];
 
-    /// Twice the published sizes; time constants around the published ones' middle, as wide as they spread.
+    /// The published sizes; time constants around the published ones' middle, as wide as they spread.
     pub fn published(axis: usize, range: usize) -> Self {
-        Self { widths: Self::SIZES[axis][range].map(|size| 1.0 * size), t_h: [7.0, 120.0], ln_t_widths: [0.7, 1.2] }
+        Self { widths: Self::SIZES[axis][range], t_h: [7.0, 120.0], ln_t_widths: [0.7, 1.2] }
     }
 }
 
@@ -199,7 +199,10 @@ impl Problem<'_> {
             normal[(n, n)] += width.powi(-2);
         }
         let solution = normal.cholesky()?.solve(&right);
-        let theta = DVector::from_iterator(6, [solution[0] + self.centre, solution[1], solution[2], solution[3], ln_t[0], ln_t[1]]);
+        let theta = DVector::from_iterator(
+            6,
+            [solution[0] + self.centre, solution[1], solution[2], solution[3], ln_t[0], ln_t[1]],
+        );
         let at = Problem { theta: theta.clone(), ..*self };
         Some((theta, at.residuals()?.norm_squared()))
     }
@@ -226,7 +229,8 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
             }
             (law.counts(point.met_h, point.temperature_c) - point.counts) / self.sigma(n)
         });
-        let expected = self.expected().into_iter().zip(self.theta.iter()).map(|((centre, width), x)| (x - centre) / width);
+        let expected =
+            self.expected().into_iter().zip(self.theta.iter()).map(|((centre, width), x)| (x - centre) / width);
         let all: Vec<f64> = points.chain(expected).collect();
         all.iter().all(|r| r.is_finite()).then(|| DVector::from_vec(all))
     }
@@ -251,7 +255,13 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
 const STARTS_H: [[f64; 3]; 2] = [[2.5, 6.5, 12.0], [30.0, 120.0, 400.0]];
 
 /// The least objective over all starts at the given weights.
-fn minimise(points: &[Point], weights: &[f64], expectation: &Expectation, centre: f64, warm: Option<&DVector<f64>>) -> Option<DVector<f64>> {
+fn minimise(
+    points: &[Point],
+    weights: &[f64],
+    expectation: &Expectation,
+    centre: f64,
+    warm: Option<&DVector<f64>>,
+) -> Option<DVector<f64>> {
     let problem = Problem { points, weights, expectation, centre, theta: DVector::zeros(PARAMETERS) };
     let mut starts: Vec<(DVector<f64>, f64)> = Vec::new();
     if let Some(theta) = warm {
@@ -465,11 +475,36 @@ mod tests {
 
     #[test]
     fn the_band_is_honest_over_seeds() {
-        for (from_h, to_h) in [(0.0, 354.0), (0.0, 72.0), (59.0, 65.0), (132.0, 157.0), (-3.8, 72.0)] {
+        // 80 seeds, errors along one mission fully correlated: the share of a 95.4 % band scatters by about 2 %.
+        for (from_h, to_h) in [(0.0, 354.0), (0.0, 72.0), (59.0, 65.0), (132.0, 157.0)] {
             for (axis, law, sigma) in [(0, X, 50.0), (1, Y, 16.0), (2, Z, 12.0)] {
-                let (share, mean) = coverage(&law, axis, from_h, to_h, sigma, 60);
-                eprintln!("{from_h} to {to_h} h, axis {axis}: {:.3} within 2 sigma, mean sigma {mean:.1} of {sigma}", share);
+                let (share, mean) = coverage(&law, axis, from_h, to_h, sigma, 80);
+                eprintln!(
+                    "{from_h} to {to_h} h, axis {axis}: {share:.3} within 2 sigma, mean sigma {mean:.1} of {sigma}"
+                );
+                assert!((0.90..=0.995).contains(&share), "axis {axis}, {from_h} to {to_h} h: {share}");
             }
         }
+    }
+
+    #[test]
+    fn six_hours_make_no_wild_law() {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let fit = fit(&mission(&X, 59.0, 65.0, 50.0, &mut rng), &Expectation::published(0, 2)).unwrap();
+        assert_eq!(fit.form(), "A1");
+        let (far, sigma, outside) = fit.at(65.0 + 48.0, 3.0);
+        assert!(outside);
+        assert!((far - X.counts(113.0, 3.0)).abs() < 3.0 * sigma, "{far} +- {sigma}");
+        assert!(sigma < 500.0, "{sigma}");
+    }
+
+    #[test]
+    fn an_outlier_loses_its_vote() {
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let mut points = mission(&Y, 0.0, 200.0, 16.0, &mut rng);
+        points[20].counts += 400.0;
+        let fit = fit(&points, &Expectation::published(1, 2)).unwrap();
+        assert_eq!(fit.weights[20], 0.0);
+        assert!(fit.weights.iter().filter(|w| **w == 0.0).count() == 1);
     }
 }

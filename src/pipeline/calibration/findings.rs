@@ -92,7 +92,9 @@ pub(super) fn scale(sequence: &ScaleSequence) -> Option<Anomaly> {
             1.0,
             0.0,
             "sequences",
-            format!("The scale calibration of {axis} in range {range} was aborted; it is skipped and the last good factor is carried over."),
+            format!(
+                "The scale calibration of {axis} in range {range} was aborted; it is skipped and the last good factor is carried over."
+            ),
         ),
         Refusal::TablePackets => (
             AnomalyKind::ScaleRecordDefect,
@@ -115,7 +117,16 @@ pub(super) fn scale(sequence: &ScaleSequence) -> Option<Anomaly> {
             ),
         ),
     };
-    Some(Anomaly { kind, from: sequence.span[0], to: sequence.span[1], axes: vec![sequence.axis], value, sigma, unit, sentence })
+    Some(Anomaly {
+        kind,
+        from: sequence.span[0],
+        to: sequence.span[1],
+        axes: vec![sequence.axis],
+        value,
+        sigma,
+        unit,
+        sentence,
+    })
 }
 
 /// Levels that differ before and after the rate.

@@ -56,7 +56,7 @@ impl Usual<'_> {
         let scatter = (seen.scatter.max(SCATTER_COUNTS_MIN) / usual).ln() / LN_SCATTER_WIDTH;
         let width = (level_ng / resolution).hypot(1.0);
         let level = (seen.level - bias) / width;
-        Some(-0.5 * (scatter * scatter + (level * level).min(400.0)) )
+        Some(-0.5 * (scatter * scatter + (level * level).min(400.0)))
     }
 }
 
@@ -104,7 +104,11 @@ struct Span {
 }
 
 /// Finds the spans, their corrections and what to tell.
-pub fn find(archive: &Archive, windows: &BTreeMap<i64, Window>, calibration: &Calibration) -> Vec<(Anomaly, Vec<RangeCorrection>)> {
+pub fn find(
+    archive: &Archive,
+    windows: &BTreeMap<i64, Window>,
+    calibration: &Calibration,
+) -> Vec<(Anomaly, Vec<RangeCorrection>)> {
     let Some(scatter_ng) = usual_scatter_ng(windows, &calibration.resolution_ng) else { return Vec::new() };
     let usual = Usual { scatter_ng, calibration };
     let mut spans: Vec<Span> = Vec::new();
@@ -127,7 +131,11 @@ pub fn find(archive: &Archive, windows: &BTreeMap<i64, Window>, calibration: &Ca
             _ => spans.push(Span { cells: [*cell, *cell], actual, windows: 1, of_axes, ln_ratio: vec![ln_ratio] }),
         }
     }
-    spans.iter().filter(|span| span.windows >= WINDOWS_MIN).filter_map(|span| settle_span(archive, &usual, windows, span)).collect()
+    spans
+        .iter()
+        .filter(|span| span.windows >= WINDOWS_MIN)
+        .filter_map(|span| settle_span(archive, &usual, windows, span))
+        .collect()
 }
 
 fn ln_scatter_ratio(usual: &Usual<'_>, window: &Window) -> f64 {
@@ -227,11 +235,7 @@ fn end_near(
         .map(|record| {
             let concerned = record.mode == Mode::Normal
                 && reported.iter().all(|(axis, range)| record.ranges[axis.index()] == *range);
-            let says = if concerned {
-                second_evidence(usual, record, reported, actual)
-            } else {
-                -SECOND_EVIDENCE_MAX
-            };
+            let says = if concerned { second_evidence(usual, record, reported, actual) } else { -SECOND_EVIDENCE_MAX };
             (record.clock, says)
         })
         .collect();

@@ -145,7 +145,8 @@ pub fn derive(
 
 /// Clocks at which a calibration was complete, or as far as it came down.
 fn ends(pairs: &[two_position::Pair<'_, '_>], scales: &[ScaleSequence]) -> Vec<Clock> {
-    let mut known: Vec<Clock> = pairs.iter().map(|p| p.opposite.last()).chain(scales.iter().map(|s| s.span[1])).collect();
+    let mut known: Vec<Clock> =
+        pairs.iter().map(|p| p.opposite.last()).chain(scales.iter().map(|s| s.span[1])).collect();
     known.sort_unstable();
     let mut ends: Vec<Clock> = Vec::new();
     for clock in known {
@@ -197,7 +198,8 @@ fn find_anomalies(archive: &Archive, windows: &BTreeMap<i64, Window>, derived: &
     anomalies.extend(derived.time_correlation.jumps.iter().map(findings::clock_jump));
     let sequences: Vec<ScaleSequence> = derived.scales.iter().map(|(sequence, _)| sequence.clone()).collect();
     anomalies.extend(sequences.iter().filter_map(findings::scale));
-    anomalies.extend(Axis::ALL.iter().filter_map(|axis| findings::shift(*axis, &derived.shifts[axis.index()], &sequences)));
+    anomalies
+        .extend(Axis::ALL.iter().filter_map(|axis| findings::shift(*axis, &derived.shifts[axis.index()], &sequences)));
     anomalies.extend(derived.measurements.iter().filter_map(findings::outlier));
     anomalies.extend(saturation::find(archive, windows, &derived.range_corrections));
     anomalies.sort_by(|a, b| a.from.cmp(&b.from).then(a.kind.cmp(&b.kind)).then(a.axes.cmp(&b.axes)));

@@ -105,9 +105,7 @@ impl NoiseHistory {
         // All axes have the same filter: their common factor first, then what sets one apart.
         let common = (pooled.0 + PRIOR_DIFFERENCES * prior) / (pooled.1 + PRIOR_DIFFERENCES);
         NoiseFactors {
-            factor: sums.map(|s| {
-                ((s.ratio + 500.0 * common) / (s.differences + 500.0)).sqrt()
-            }),
+            factor: sums.map(|s| ((s.ratio + 500.0 * common) / (s.differences + 500.0)).sqrt()),
             half_drift_variance_ng2: sums.map(|s| if s.slopes > 50.0 { (s.slope / s.slopes).max(0.0) } else { 0.0 }),
             signal_differences: sums.map(|s| {
                 let n = s.halves.max(1.0);

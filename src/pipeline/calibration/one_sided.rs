@@ -32,7 +32,8 @@ pub struct OneSided {
 impl OneSided {
     /// Whether the flight estimator flew: most comparisons agree with it and not with the right one.
     pub fn flew(&self) -> Option<bool> {
-        (self.compared >= 12).then_some(2 * self.flight_exact > self.compared && self.flight_exact > 10 * self.right_exact)
+        (self.compared >= 12)
+            .then_some(2 * self.flight_exact > self.compared && self.flight_exact > 10 * self.right_exact)
     }
 }
 
@@ -52,7 +53,8 @@ pub fn samples_of(archive: &Archive, estimate: &OnBoardEstimate) -> Option<([Vec
             if clock < from || clock >= to {
                 continue;
             }
-            if *ranges.get_or_insert(record.ranges) != record.ranges || sample.iter().any(|c| AccRecord::is_at_rail(*c)) {
+            if *ranges.get_or_insert(record.ranges) != record.ranges || sample.iter().any(|c| AccRecord::is_at_rail(*c))
+            {
                 return None;
             }
             counts.iter_mut().zip(sample).for_each(|(axis, count)| axis.push(*count));
@@ -76,7 +78,8 @@ pub fn compare(archive: &Archive, law: &TrimLaw) -> OneSided {
         let first = found.span.map_or(estimate.clock, |span| span[0]);
         found.span = Some([first, estimate.clock.plus_tenths(SAMPLES as i64)]);
         for (axis, sorted) in counts.iter().enumerate() {
-            let (Some(right), Some((flight, ..))) = (trimmed_mean(sorted, law), flight_trimmed_mean(sorted, law)) else {
+            let (Some(right), Some((flight, ..))) = (trimmed_mean(sorted, law), flight_trimmed_mean(sorted, law))
+            else {
                 continue;
             };
             if ranges[axis] == Range::C {

@@ -2,8 +2,8 @@
 
 use crate::math::robust::{TrimLaw, TrimmedMean, trimmed_mean};
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
-use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, SAMPLES_PER_RECORD, Step};
 use crate::pipeline::window::Window;
+use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, SAMPLES_PER_RECORD, Step};
 use crate::units::Clock;
 
 /// Two records of one step are no further apart than this, tenths of a second: lost seconds do not end a step.
@@ -76,7 +76,13 @@ impl Hold<'_> {
     }
 
     /// The adaptive trimmed mean of an axis after taking a transient away; None of fewer than `samples_min` samples.
-    pub fn mean(&self, axis: Axis, law: &TrimLaw, samples_min: usize, transient: impl Fn(f64) -> f64) -> Option<TrimmedMean> {
+    pub fn mean(
+        &self,
+        axis: Axis,
+        law: &TrimLaw,
+        samples_min: usize,
+        transient: impl Fn(f64) -> f64,
+    ) -> Option<TrimmedMean> {
         let mut counts: Vec<i16> =
             self.samples(axis).map(|(t_s, count)| (f64::from(count) - transient(t_s)).round() as i16).collect();
         if counts.len() < samples_min {

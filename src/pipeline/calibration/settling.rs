@@ -13,7 +13,8 @@ use crate::units::Clock;
 pub const DETECTION_SIGMA: f64 = 6.0;
 /// Trial time constants, s: from one second to half a position.
 const TAUS_S: [f64; 25] = [
-    1.5, 1.8, 2.1, 2.5, 2.9, 3.3, 3.7, 4.1, 4.5, 4.9, 5.2, 5.5, 5.8, 6.1, 6.4, 6.8, 7.2, 7.7, 8.3, 9.0, 10.0, 11.5, 13.5, 16.0, 20.0,
+    1.5, 1.8, 2.1, 2.5, 2.9, 3.3, 3.7, 4.1, 4.5, 4.9, 5.2, 5.5, 5.8, 6.1, 6.4, 6.8, 7.2, 7.7, 8.3, 9.0, 10.0, 11.5,
+    13.5, 16.0, 20.0,
 ];
 /// Means of one second are correlated: variance of a fit over that of independent seconds.
 const CORRELATION: f64 = 1.5;

@@ -37,17 +37,24 @@ pub struct Shift {
     pub sigma_counts: f64,
     /// Sequences.
     pub sequences: usize,
+    /// Errors beyond which it counts.
+    threshold_sigma: f64,
 }
 
 impl Shift {
     /// Whether there is one.
     pub fn is_real(&self) -> bool {
-        self.sequences > 0 && self.counts.abs() > SHIFT_SIGMA * self.sigma_counts
+        self.sequences > 0 && self.counts.abs() > self.threshold_sigma * self.sigma_counts
     }
 }
 
 /// The version known at a clock.
-pub(super) fn version(number: u32, known_since: Clock, noise: NoiseFactors, material: &Material<'_, '_, '_>) -> Version {
+pub(super) fn version(
+    number: u32,
+    known_since: Clock,
+    noise: NoiseFactors,
+    material: &Material<'_, '_, '_>,
+) -> Version {
     let settings = material.settings;
     let instrument = &settings.instrument;
     let pairs: Vec<&Pair<'_, '_>> = material.pairs.iter().filter(|p| p.opposite.last() <= known_since).collect();
@@ -159,7 +166,8 @@ fn scale_factors(
         .iter()
         .map(|sequence| {
             let (i, j) = (sequence.axis.index(), sequence.range.index());
-            let bias = calibration.bias_and_error(sequence.axis, sequence.range, sequence.clock_s, sequence.temperature_c)?;
+            let bias =
+                calibration.bias_and_error(sequence.axis, sequence.range, sequence.clock_s, sequence.temperature_c)?;
             let instrument = &settings.instrument;
             let use_post = !(sequence.range == Range::C && shifts[i].is_real());
             sequence.measure(bias, instrument.resolution_ng[i][j], instrument.radius_m[i], noise.factor[i], use_post)
@@ -202,5 +210,10 @@ fn shift(known: &[&ScaleSequence], axis: Axis, noise: &NoiseFactors, settings: &
         return Shift::default();
     }
     let counts = shifts.iter().map(|[d, sigma]| d * sigma.powi(-2)).sum::<f64>() / weight;
-    Shift { counts, sigma_counts: weight.powf(-0.5), sequences: shifts.len() }
+    Shift {
+        counts,
+        sigma_counts: weight.powf(-0.5),
+        sequences: shifts.len(),
+        threshold_sigma: SHIFT_SIGMA[axis.index()],
+    }
 }
