@@ -20,10 +20,14 @@ enum Command {
     Process(command::process::Args),
     /// The service: dumps in at a TCP port, products out over HTTP and WebSocket.
     Serve(command::serve::Args),
+    /// The whole thing with nothing prepared: the service, and a simulated mission flown into it.
+    Demo(command::demo::Args),
     /// Sends dump files as a recorder playback would arrive.
     Replay(command::replay::Args),
     /// Products out of a data directory.
     Export(command::export::Args),
+    /// A mission flown: its dump and its truth.
+    Simulate(command::simulate::Args),
     /// Makes, seals, runs and scores concealed cases.
     Challenge(command::challenge::Args),
 }
@@ -32,8 +36,10 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Process(args) => command::process::run(args),
         Command::Serve(args) => command::serve::run(args),
+        Command::Demo(args) => command::demo::run(args),
         Command::Replay(args) => command::replay::run(args),
         Command::Export(args) => command::export::run(args),
+        Command::Simulate(args) => command::simulate::run(args),
         Command::Challenge(args) => command::challenge::run(args),
     };
     done.unwrap_or_else(|error| {

@@ -1,13 +1,16 @@
 //! The commands of `oare`, one a file: arguments in, exit code out. The work is in the library.
 
 pub mod challenge;
+pub mod demo;
 pub mod export;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 pub mod process;
 pub mod replay;
 pub mod serve;
+pub mod simulate;
 
 /// Done.
 pub const DONE: ExitCode = ExitCode::SUCCESS;
@@ -30,7 +33,7 @@ pub fn done_in_part() -> ExitCode {
 /// Logs go to standard error; `RUST_LOG` chooses which.
 pub fn log_to_stderr() {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
-    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_ansi(std::io::stderr().is_terminal()).with_writer(std::io::stderr).try_init();
 }
 
 /// The runtime of a service.
