@@ -2,15 +2,15 @@
 
 pub mod challenge;
 pub mod demo;
+pub mod diagnose;
 pub mod export;
-
-use std::io::IsTerminal;
-use std::process::ExitCode;
-
 pub mod process;
 pub mod replay;
 pub mod serve;
 pub mod simulate;
+
+use std::io::IsTerminal;
+use std::process::ExitCode;
 
 /// Done.
 pub const DONE: ExitCode = ExitCode::SUCCESS;
