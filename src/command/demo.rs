@@ -101,7 +101,8 @@ async fn start(args: &Args, data: &Path) -> Result<Service> {
             return Err(error.into());
         }
         eprintln!("oare demo: {error}; taking a free port");
-        let busy = if *address == config.ingest.address { &mut config.ingest.address } else { &mut config.http.address };
+        let busy =
+            if *address == config.ingest.address { &mut config.ingest.address } else { &mut config.http.address };
         busy.set_port(0);
     }
 }

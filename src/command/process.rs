@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
-use sha2::{Digest, Sha256};
 use oare_ground::config::Config;
 use oare_ground::hub::{Body, Message};
 use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader, Verdict};
@@ -15,6 +14,7 @@ use oare_ground::pipeline::calibration::KnownCalibration;
 use oare_ground::pipeline::station::replay;
 use oare_ground::pipeline::{PlaybackId, Station, files};
 use oare_ground::record::{mcap_file::Recording, mcap_reader};
+use sha2::{Digest, Sha256};
 
 /// Arguments of `oare process`.
 #[derive(clap::Args)]

@@ -308,17 +308,19 @@ impl Writer {
         Ok(())
     }
 
+    /// Publishes changes, some at a time: a new calibration changes every window there is.
     fn publish(&mut self, changes: Vec<Change>) {
-        if changes.is_empty() {
-            return;
+        const AT_ONCE: usize = 1024;
+        let mut changes = changes.into_iter().peekable();
+        while changes.peek().is_some() {
+            let bodies: Vec<Body> = {
+                let station = self.station.read().expect("no holder panics");
+                changes.by_ref().take(AT_ONCE).filter_map(|change| body(&self.hub, &station, change)).collect()
+            };
+            let journaled = self.hub.publish(bodies);
+            self.unjournaled.entries.extend(journaled.entries);
+            self.unjournaled.forgotten.extend(journaled.forgotten);
         }
-        let bodies: Vec<Body> = {
-            let station = self.station.read().expect("no holder panics");
-            changes.into_iter().filter_map(|change| body(&self.hub, &station, change)).collect()
-        };
-        let journaled = self.hub.publish(bodies);
-        self.unjournaled.entries.extend(journaled.entries);
-        self.unjournaled.forgotten.extend(journaled.forgotten);
     }
 
     fn show(&self) {

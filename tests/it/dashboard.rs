@@ -28,7 +28,8 @@ fn dumped_page(url: &str) -> Option<String> {
 fn attribute<'a>(page: &'a str, id: &str, name: &str) -> &'a str {
     let element = &page[page.find(&format!("id=\"{id}\"")).unwrap_or_else(|| panic!("no {id} in the page"))..];
     let element = &element[..element.find('>').unwrap()];
-    let value = &element[element.find(&format!("{name}=\"")).unwrap_or_else(|| panic!("no {name}: {element}")) + name.len() + 2..];
+    let value = &element
+        [element.find(&format!("{name}=\"")).unwrap_or_else(|| panic!("no {name}: {element}")) + name.len() + 2..];
     &value[..value.find('"').unwrap()]
 }
 
