@@ -26,6 +26,9 @@ pub struct Args {
     /// Winds, density waves and panel areas that the analyser's regressors do not have.
     #[arg(long)]
     other_physics: bool,
+    /// Draw from the real recordings below this folder instead of simulated ones.
+    #[arg(long)]
+    real: Option<PathBuf>,
     /// Write the cases here as directories, their truths apart from them.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -33,6 +36,9 @@ pub struct Args {
 
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if let Some(dir) = &args.real {
+        return super::challenge_real::run(dir, args.cases, args.seed, args.out.as_deref());
+    }
     let only = args.effect.as_deref().map(known).transpose()?;
     let kinds = match (args.kinds.is_empty(), only) {
         (false, _) => args.kinds.clone(),
@@ -61,7 +67,7 @@ fn known(id: &str) -> anyhow::Result<&'static str> {
     })
 }
 
-fn bar(length: usize, doing: &'static str) -> ProgressBar {
+pub(super) fn bar(length: usize, doing: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg:>10} {bar:40} {pos}/{len} {elapsed} (left {eta})");
     let bar = ProgressBar::new(length as u64).with_message(doing);
     if let Ok(style) = style { bar.with_style(style) } else { bar }

@@ -4,6 +4,10 @@ pub mod challenge;
 pub mod demo;
 pub mod diagnose;
 pub mod export;
+mod challenge_real;
+
+use std::process::ExitCode;
+
 pub mod process;
 pub mod replay;
 pub mod serve;
