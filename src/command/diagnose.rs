@@ -74,7 +74,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 fn analyse(args: &Args) -> Result<Analysis, CaseError> {
     let case = read_case(&args.case, &args.set)?;
-    let settings = Settings { seed: args.seed, bootstraps: args.bootstraps, without: args.without.clone(), claim_probability: args.claim_probability };
+    let settings = Settings {
+        seed: args.seed,
+        bootstraps: args.bootstraps,
+        without: args.without.clone(),
+        claim_probability: args.claim_probability,
+    };
     let prepared = Prepared::new(&case, &settings)?;
     let bar = ProgressBar::new(args.bootstraps as u64);
     if let Ok(style) = ProgressStyle::with_template("bootstrap {bar:40} {pos}/{len} {elapsed} (left {eta})") {
@@ -98,7 +103,8 @@ fn analyse(args: &Args) -> Result<Analysis, CaseError> {
 /// [`CaseError`] with one sentence that names the file and the value.
 pub fn read_case(directory: &Path, set: &[String]) -> Result<Case, CaseError> {
     let text = |name: &str| std::fs::read_to_string(directory.join(name)).ok();
-    let toml = text("case.toml").ok_or_else(|| CaseError::MissingFile { file: directory.join("case.toml").display().to_string() })?;
+    let toml = text("case.toml")
+        .ok_or_else(|| CaseError::MissingFile { file: directory.join("case.toml").display().to_string() })?;
     let header = Header::parse(&toml, set)?;
     if header.kind != "acceleration_csv" {
         return Err(CaseError::Kind(header.kind));
@@ -147,8 +153,14 @@ fn print_table(diagnosis: &Diagnosis) {
         println!("  alternative: {} (posterior {:.3})", a.effects.join(" + "), a.posterior);
     }
     if let Some(fit) = &diagnosis.fit {
-        println!("  rms before {:.1?} ng, after {:.1?} ng, noise floor {:.1?} ng", fit.before.rms_ng, fit.after.rms_ng, fit.noise_floor_ng);
-        println!("  held out: log score gain {:.1} +- {:.1}, excess removed {:.3}", fit.held_out.log_score_gain, fit.held_out.log_score_gain_se, fit.held_out.excess_removed);
+        println!(
+            "  rms before {:.1?} ng, after {:.1?} ng, noise floor {:.1?} ng",
+            fit.before.rms_ng, fit.after.rms_ng, fit.noise_floor_ng
+        );
+        println!(
+            "  held out: log score gain {:.1} +- {:.1}, excess removed {:.3}",
+            fit.held_out.log_score_gain, fit.held_out.log_score_gain_se, fit.held_out.excess_removed
+        );
     }
     for note in &diagnosis.notes {
         println!("  note: {note}");

@@ -84,10 +84,14 @@ impl<'a> Prepared<'a> {
 
     /// The statistic of replicate `index`: a record of the fitted noise alone through the whole search, the noise fitted anew.
     pub fn replicate(&self, index: usize) -> f64 {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(self.settings.seed.wrapping_mul(1_000_003).wrapping_add(index as u64));
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(
+            self.settings.seed.wrapping_mul(1_000_003).wrapping_add(index as u64),
+        );
         let noise = self.null_noise();
         let residual: Axes = std::array::from_fn(|k| {
-            noise::simulate(&noise[k], &self.scene.schedule, &self.scene.activity[k], || StandardNormal.sample(&mut rng))
+            noise::simulate(&noise[k], &self.scene.schedule, &self.scene.activity[k], || {
+                StandardNormal.sample(&mut rng)
+            })
         });
         let scene = self.scene.with_residual(residual);
         solve(&scene, &self.library, Some(&noise)).statistic()
@@ -96,7 +100,12 @@ impl<'a> Prepared<'a> {
     /// Noise under which the bootstrap is made: that of the best hypothesis, for its residual holds no effect, unless it is larger
     /// than the null's own.
     fn null_noise(&self) -> [AxisNoise; 3] {
-        let best = self.solution.listed.iter().chain(&self.solution.open).max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior));
+        let best = self
+            .solution
+            .listed
+            .iter()
+            .chain(&self.solution.open)
+            .max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior));
         match best {
             Some(best) if best.log_posterior > self.solution.null.log_posterior => best.noise,
             _ => self.solution.null.noise,
@@ -116,7 +125,8 @@ impl<'a> Prepared<'a> {
         // Few replicates cannot show a small probability: then the table decides, and the bootstrap may only forbid.
         let enough = (replicates.len() + 1) as f64 * self.settings.claim_probability >= 1.0;
         let decisive = if enough || probability > 3.0 / (replicates.len() + 1) as f64 { probability } else { table };
-        let (diagnosis, model_ng, ladder) = verdict::conclude(&self.scene, &self.library, &self.solution, decisive, self.settings.claim_probability);
+        let (diagnosis, model_ng, ladder) =
+            verdict::conclude(&self.scene, &self.library, &self.solution, decisive, self.settings.claim_probability);
         Analysis { plates: plates(&self.scene, model_ng, ladder), diagnosis }
     }
 }
@@ -126,14 +136,23 @@ fn plates(scene: &Scene, model_ng: Axes, ladder: Vec<(String, f64)>) -> Plates {
         let mean = series.iter().sum::<f64>() / series.len() as f64;
         series.iter().map(|x| x - mean).collect::<Vec<f64>>()
     };
-    let plate = |name: &str, unit: &str, values: Vec<f64>| CovariatePlate { name: name.into(), unit: unit.into(), values };
+    let plate =
+        |name: &str, unit: &str, values: Vec<f64>| CovariatePlate { name: name.into(), unit: unit.into(), values };
     let degrees = |x: f64| x.to_degrees();
     let covariates = vec![
-        plate("argument of latitude", "deg", at_windows(scene, |g| {
-            let state = crate::physics::orbit::State { r_m: scene.r_m[g], v_m_s: scene.v_m_s[g] };
-            degrees(crate::physics::orbit::argument_of_latitude_rad(&state))
-        })),
-        plate("Sun zenith angle", "deg", at_windows(scene, |g| degrees(scene.sun[g].dot(&scene.r_m[g].normalize()).clamp(-1.0, 1.0).acos()))),
+        plate(
+            "argument of latitude",
+            "deg",
+            at_windows(scene, |g| {
+                let state = crate::physics::orbit::State { r_m: scene.r_m[g], v_m_s: scene.v_m_s[g] };
+                degrees(crate::physics::orbit::argument_of_latitude_rad(&state))
+            }),
+        ),
+        plate(
+            "Sun zenith angle",
+            "deg",
+            at_windows(scene, |g| degrees(scene.sun[g].dot(&scene.r_m[g].normalize()).clamp(-1.0, 1.0).acos())),
+        ),
         plate("sensor temperature", "C", at_windows(scene, |g| scene.temperature_c[g])),
         plate("modelled drag", "ng", at_windows(scene, |g| scene.drag_ng[g].norm())),
     ];

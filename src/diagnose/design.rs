@@ -47,17 +47,15 @@ impl Column {
         let mut out = self.clone();
         for (a, b) in out.parts.iter_mut().zip(&other.parts) {
             let Some(b) = b else { continue };
-            match a {
-                Some(a) => {
-                    assert!(a.first == 0, "only a full column can be reduced");
-                    assert!(a.whitened.len() >= b.first + b.whitened.len(), "only a full column can be reduced");
-                    for (x, y) in a.whitened[b.first..].iter_mut().zip(&b.whitened) {
-                        *x -= factor * y;
-                    }
-                    a.constant -= factor * b.constant;
-                }
-                None => *a = Some(Part { first: b.first, whitened: b.whitened.iter().map(|y| -factor * y).collect(), constant: -factor * b.constant }),
+            let part = a.get_or_insert_with(|| Part { first: b.first, whitened: Vec::new(), constant: 0.0 });
+            let first = part.first.min(b.first);
+            let end = (part.first + part.whitened.len()).max(b.first + b.whitened.len());
+            let mut whitened = vec![0.0; end - first];
+            whitened[part.first - first..part.first - first + part.whitened.len()].copy_from_slice(&part.whitened);
+            for (x, y) in whitened[b.first - first..].iter_mut().zip(&b.whitened) {
+                *x -= factor * y;
             }
+            *part = Part { first, whitened, constant: part.constant - factor * b.constant };
         }
         out
     }
@@ -65,8 +63,11 @@ impl Column {
     /// Whitened values of one axis with the constant's share removed; empty where the column is absent.
     pub fn projected(&self, axis: usize, frame: &Frame) -> Vec<f64> {
         match &self.parts[axis] {
-            Some(p) => p.whitened.iter().zip(&frame.ones[axis][p.first..]).map(|(x, o)| x - p.constant * o).collect(),
-            None => Vec::new(),
+            Some(p) => {
+                let value = |i: usize| i.checked_sub(p.first).and_then(|j| p.whitened.get(j)).copied().unwrap_or(0.0);
+                frame.ones[axis].iter().enumerate().map(|(i, o)| value(i) - p.constant * o).collect()
+            }
+            None => vec![0.0; frame.ones[axis].len()],
         }
     }
 }
@@ -143,7 +144,8 @@ impl<'a> Chosen<'a> {
         for column in fixed {
             data = data.less(column, 1.0);
         }
-        let mut log_evidence = if fixed.is_empty() { 0.0 } else { 0.5 * (frame.data.dot(&frame.data) - data.dot(&data)) };
+        let mut log_evidence =
+            if fixed.is_empty() { 0.0 } else { 0.5 * (frame.data.dot(&frame.data) - data.dot(&data)) };
         let n = columns.len();
         if n == 0 {
             return Self { columns, data, cholesky: None, reduced: DVector::zeros(0), log_evidence };
@@ -184,7 +186,10 @@ impl<'a> Chosen<'a> {
     pub fn gain(&self, columns: &[Column]) -> f64 {
         let n = columns.len();
         let overlaps: Vec<DVector<f64>> = columns.iter().map(|c| self.overlap(c)).collect();
-        let y = DVector::from_iterator(n, columns.iter().zip(&overlaps).map(|(c, o)| c.dot(&self.data) - o.dot(&self.reduced)));
+        let y = DVector::from_iterator(
+            n,
+            columns.iter().zip(&overlaps).map(|(c, o)| c.dot(&self.data) - o.dot(&self.reduced)),
+        );
         let mut a = DMatrix::identity(n, n);
         for i in 0..n {
             for j in 0..=i {
@@ -220,7 +225,10 @@ impl<'a> Chosen<'a> {
     pub fn posterior(&self) -> (DVector<f64>, DMatrix<f64>) {
         match &self.cholesky {
             Some(c) => {
-                let mean = c.l_dirty().tr_solve_lower_triangular(&self.reduced).unwrap_or_else(|| DVector::zeros(self.columns.len()));
+                let mean = c
+                    .l_dirty()
+                    .tr_solve_lower_triangular(&self.reduced)
+                    .unwrap_or_else(|| DVector::zeros(self.columns.len()));
                 (mean, c.inverse())
             }
             None => (DVector::zeros(0), DMatrix::zeros(0, 0)),

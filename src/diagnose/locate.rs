@@ -20,10 +20,22 @@ pub fn of_signal(scene: &Scene, signal: &Axes, why: &str) -> Located {
     let mean: [f64; 3] = std::array::from_fn(|k| signal[k].iter().sum::<f64>() / n as f64);
     let energy: [f64; 3] = std::array::from_fn(|k| signal[k].iter().map(|x| (x - mean[k]).powi(2)).sum());
     let total: f64 = energy.iter().sum();
-    let axes = ["x", "y", "z"].iter().zip(energy).filter(|(_, e)| *e > AXIS_SHARE * total && total > 0.0).map(|(a, _)| a.to_string()).collect();
+    let axes = ["x", "y", "z"]
+        .iter()
+        .zip(energy)
+        .filter(|(_, e)| *e > AXIS_SHARE * total && total > 0.0)
+        .map(|(a, _)| a.to_string())
+        .collect();
     let (frame, direction) = direction(scene, signal);
     let size: Vec<f64> = (0..n).map(|i| (0..3).map(|k| signal[k][i].powi(2)).sum::<f64>().sqrt()).collect();
-    Located { axes, frame, direction, intervals: intervals(clock, &size, why), covariates: Vec::new(), per_orbit_lines: Vec::new() }
+    Located {
+        axes,
+        frame,
+        direction,
+        intervals: intervals(clock, &size, why),
+        covariates: Vec::new(),
+        per_orbit_lines: Vec::new(),
+    }
 }
 
 /// The frame in which the signal keeps most to one line, and that line if it carries nine tenths of it.
@@ -119,14 +131,24 @@ pub fn lines(scene: &Scene, frame: &Frame) -> Vec<OrbitLine> {
     let mut found: Vec<(f64, OrbitLine)> = Vec::new();
     for &c in &cycles {
         let rate = std::f64::consts::TAU * c / scene.period_s;
-        let [sin, cos]: [Vec<f64>; 2] = [scene.clock_s().iter().map(|t| (rate * t).sin()).collect(), scene.clock_s().iter().map(|t| (rate * t).cos()).collect()];
+        let [sin, cos]: [Vec<f64>; 2] = [
+            scene.clock_s().iter().map(|t| (rate * t).sin()).collect(),
+            scene.clock_s().iter().map(|t| (rate * t).cos()).collect(),
+        ];
         for axis in 0..3 {
             let columns = [frame.scalar(axis, &sin, 30.0), frame.scalar(axis, &cos, 30.0)];
             let gain = empty.gain(&columns);
             if gain > charge {
                 let (mean, _) = Chosen::new(frame, columns.iter().collect(), &[]).posterior();
                 let amplitude_ng = 30.0 * (mean[0].powi(2) + mean[1].powi(2)).sqrt();
-                found.push((gain, OrbitLine { cycles_per_orbit: (c * 10.0).round() / 10.0, axis: ["x", "y", "z"][axis].into(), amplitude_ng }));
+                found.push((
+                    gain,
+                    OrbitLine {
+                        cycles_per_orbit: (c * 10.0).round() / 10.0,
+                        axis: ["x", "y", "z"][axis].into(),
+                        amplitude_ng,
+                    },
+                ));
             }
         }
     }

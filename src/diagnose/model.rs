@@ -48,7 +48,12 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
         let mut fit = MemberFit::default();
         let Family::Listed(effect) = entries[m.entry].family else {
             for k in 0..m.linear() {
-                fit.parameters.push(Fitted { name: "amplitude_ng", value: mean[next + k], sigma: joint[(next + k, next + k)].max(0.0).sqrt() * inflation, unit: "ng" });
+                fit.parameters.push(Fitted {
+                    name: "amplitude_ng",
+                    value: mean[next + k],
+                    sigma: joint[(next + k, next + k)].max(0.0).sqrt() * inflation,
+                    unit: "ng",
+                });
             }
             next += m.linear();
             out.push(fit);
@@ -65,12 +70,27 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
             } else {
                 1.0
             };
+            let sigma = if p.name == "onset_s" && p.step > 0.0 {
+                sigma.max(onset_sigma(scene, frame, entries, set, out.len()) * inflation)
+            } else {
+                sigma
+            };
             let value = if p.log { m.theta[j].exp() } else { m.theta[j] };
-            fit.parameters.push(Fitted { name: p.name, value, sigma: if p.log { value * sigma } else { sigma }, unit: p.unit });
+            fit.parameters.push(Fitted {
+                name: p.name,
+                value,
+                sigma: if p.log { value * sigma } else { sigma },
+                unit: p.unit,
+            });
         }
         for (k, l) in effect.linear.iter().enumerate().take(m.linear()) {
             let value = mean[next + k];
-            fit.parameters.push(Fitted { name: l.name, value, sigma: joint[(next + k, next + k)].max(0.0).sqrt() * inflation, unit: l.unit });
+            fit.parameters.push(Fitted {
+                name: l.name,
+                value,
+                sigma: joint[(next + k, next + k)].max(0.0).sqrt() * inflation,
+                unit: l.unit,
+            });
             if value.abs() > l.size_max {
                 fit.incredible.push((l.name, value, l.size_max));
             }
@@ -79,6 +99,35 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
         out.push(fit);
     }
     out
+}
+
+/// Windows on either side of an onset over which its posterior is scanned, and the spacing of the scan, s.
+const ONSET_SCAN_S: [f64; 2] = [600.0, 20.0];
+
+/// Standard error of the onset of member `i` about its fitted value, from its posterior: one window more or less can decide,
+/// so that the curvature at the peak says too little.
+fn onset_sigma(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: usize) -> f64 {
+    let Family::Listed(effect) = entries[set.members[i].entry].family else { return 0.0 };
+    let others = Set {
+        members: set.members.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, m)| m.clone()).collect(),
+        score: 0.0,
+    };
+    let chosen = others.chosen(frame);
+    let steps = (ONSET_SCAN_S[0] / ONSET_SCAN_S[1]) as i32;
+    let sizes = &entries[set.members[i].entry].sizes;
+    let scan: Vec<(f64, f64)> = (-steps..=steps)
+        .filter_map(|s| {
+            let shift = f64::from(s) * ONSET_SCAN_S[1];
+            let mut theta = set.members[i].theta;
+            theta[0] += shift;
+            let raws = (effect.signature)(scene, &theta)?.columns();
+            let columns: Vec<Column> = raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, *size)).collect();
+            Some((shift, chosen.gain(&columns)))
+        })
+        .collect();
+    let top = scan.iter().map(|s| s.1).fold(f64::NEG_INFINITY, f64::max);
+    let weight: f64 = scan.iter().map(|s| (s.1 - top).exp()).sum();
+    (scan.iter().map(|s| s.0 * s.0 * (s.1 - top).exp()).sum::<f64>() / weight).sqrt()
 }
 
 /// Covariance of all coefficients, then of all free nonlinear parameters, from the linearised joint fit.
@@ -109,7 +158,8 @@ fn joint_covariance(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) 
                 (None, Some(low)) => (member_series(scene, frame, entries, set, set, i)?, low, h),
                 (None, None) => return None,
             };
-            let slope = std::array::from_fn(|k| Some(high[k].iter().zip(&low[k]).map(|(a, b)| (a - b) / span).collect()));
+            let slope =
+                std::array::from_fn(|k| Some(high[k].iter().zip(&low[k]).map(|(a, b)| (a - b) / span).collect()));
             columns.push(frame.column(&slope, 1.0));
             prior.push(0.0);
         }
@@ -176,7 +226,8 @@ pub fn held_out(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, nois
     let clock = scene.clock_s();
     let block = |i: usize| ((clock[i] - clock[0]) / BLOCK_S) as usize;
     let n = clock.len();
-    let halves: Vec<Half> = (0..2).map(|side| half(scene, noise, (0..n).filter(|i| block(*i) % 2 == side).collect())).collect();
+    let halves: Vec<Half> =
+        (0..2).map(|side| half(scene, noise, (0..n).filter(|i| block(*i) % 2 == side).collect())).collect();
     let full = search::residual(scene, frame, entries, set);
     let mut after: Axes = scene.residual_ng.clone();
     let mut signal_energy = 0.0;
@@ -190,7 +241,8 @@ pub fn held_out(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, nois
         let predicted = predict(scene, entries, set, train);
         let on_test = |axes: &Axes| test.frame.column(&std::array::from_fn(|k| Some(pick(&axes[k], &test.index))), 1.0);
         let p = on_test(&predicted);
-        let fitted: Axes = std::array::from_fn(|k| scene.residual_ng[k].iter().zip(&full[k]).map(|(a, b)| a - b).collect());
+        let fitted: Axes =
+            std::array::from_fn(|k| scene.residual_ng[k].iter().zip(&full[k]).map(|(a, b)| a - b).collect());
         let s = on_test(&fitted);
         let missed = s.less(&p, 1.0);
         signal_energy += s.dot(&s);

@@ -33,30 +33,58 @@ struct Collector<'a> {
 
 impl Collector<'_> {
     /// A number on the grid.
-    fn grid(&mut self, formula: impl Into<String>, covariate: &'static str, location: &'static str, f: impl Fn(usize) -> f64) {
+    fn grid(
+        &mut self,
+        formula: impl Into<String>,
+        covariate: &'static str,
+        location: &'static str,
+        f: impl Fn(usize) -> f64,
+    ) {
         let series = self.scene.measure_scalar(f);
         self.windows(formula, covariate, location, series);
     }
 
     /// A series at the windows.
-    fn windows(&mut self, formula: impl Into<String>, covariate: &'static str, location: &'static str, series: Vec<f64>) {
+    fn windows(
+        &mut self,
+        formula: impl Into<String>,
+        covariate: &'static str,
+        location: &'static str,
+        series: Vec<f64>,
+    ) {
         if let Some(series) = standard(&series) {
             self.atoms.push(Atom { formula: formula.into(), covariate, location, shape: Shape::Scalar(series) });
         }
     }
 
     /// Several numbers on the grid, each with a coefficient on every body axis.
-    fn several(&mut self, formula: impl Into<String>, covariate: &'static str, location: &'static str, parts: &[&dyn Fn(usize) -> f64]) {
+    fn several(
+        &mut self,
+        formula: impl Into<String>,
+        covariate: &'static str,
+        location: &'static str,
+        parts: &[&dyn Fn(usize) -> f64],
+    ) {
         let series: Vec<Vec<f64>> = parts.iter().filter_map(|f| standard(&self.scene.measure_scalar(f))).collect();
         if series.len() == parts.len() {
-            let columns: Vec<Raw> = series.iter().flat_map(|s| (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| s.clone())))).collect();
+            let columns: Vec<Raw> = series
+                .iter()
+                .flat_map(|s| (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| s.clone()))))
+                .collect();
             self.atoms.push(Atom { formula: formula.into(), covariate, location, shape: Shape::Columns(columns) });
         }
     }
 
     /// Vectors on the grid, one coefficient each, scaled to unit deviation over all axes.
-    fn vectors(&mut self, formula: impl Into<String>, covariate: &'static str, location: &'static str, parts: &[&dyn Fn(usize) -> Vec3]) {
-        let columns: Vec<Raw> = parts.iter().filter_map(|f| standard_vector(&self.scene.measure(f))).map(|axes| axes.map(Some)).collect();
+    fn vectors(
+        &mut self,
+        formula: impl Into<String>,
+        covariate: &'static str,
+        location: &'static str,
+        parts: &[&dyn Fn(usize) -> Vec3],
+    ) {
+        let columns: Vec<Raw> =
+            parts.iter().filter_map(|f| standard_vector(&self.scene.measure(f))).map(|axes| axes.map(Some)).collect();
         if columns.len() == parts.len() {
             self.atoms.push(Atom { formula: formula.into(), covariate, location, shape: Shape::Columns(columns) });
         }
@@ -72,15 +100,18 @@ fn standard(series: &[f64]) -> Option<Vec<f64>> {
     let zero_at_rest = series.iter().filter(|x| **x == 0.0).count() * 2 > series.len();
     // A form that is zero most of the time keeps its zeros: its support is where it lives.
     let shift = if zero_at_rest { 0.0 } else { mean };
-    (deviation.is_finite() && deviation > 1e-9 * largest && deviation > 0.0).then(|| series.iter().map(|x| (x - shift) / deviation).collect())
+    (deviation.is_finite() && deviation > 1e-9 * largest && deviation > 0.0)
+        .then(|| series.iter().map(|x| (x - shift) / deviation).collect())
 }
 
 fn standard_vector(axes: &Axes) -> Option<Axes> {
     let n = axes[0].len() as f64;
     let mean: [f64; 3] = std::array::from_fn(|k| axes[k].iter().sum::<f64>() / n);
-    let deviation = ((0..3).map(|k| axes[k].iter().map(|x| (x - mean[k]).powi(2)).sum::<f64>()).sum::<f64>() / n).sqrt();
+    let deviation =
+        ((0..3).map(|k| axes[k].iter().map(|x| (x - mean[k]).powi(2)).sum::<f64>()).sum::<f64>() / n).sqrt();
     let largest = axes.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
-    (deviation.is_finite() && deviation > 1e-6 * largest && deviation > 0.0).then(|| std::array::from_fn(|k| axes[k].iter().map(|x| (x - mean[k]) / deviation).collect()))
+    (deviation.is_finite() && deviation > 1e-6 * largest && deviation > 0.0)
+        .then(|| std::array::from_fn(|k| axes[k].iter().map(|x| (x - mean[k]) / deviation).collect()))
 }
 
 /// The dictionary for a case.
@@ -138,20 +169,46 @@ fn lvlh(scene: &Scene, g: usize) -> [Vec3; 3] {
 fn orbit(c: &mut Collector) {
     let s = c.scene;
     let (u, noon) = angles(s);
-    let bodies: [Vec<Vec3>; 3] = std::array::from_fn(|k| (0..s.grid_s.len()).map(|g| s.body[g] * lvlh(s, g)[k]).collect());
+    let bodies: [Vec<Vec3>; 3] =
+        std::array::from_fn(|k| (0..s.grid_s.len()).map(|g| s.body[g] * lvlh(s, g)[k]).collect());
     let place = "a phase of the orbit";
     for k in 1..=6 {
         let n = k as f64;
-        c.several(format!("sin {k}u, cos {k}u"), "argument_of_latitude", place, &[&|g| (n * u[g]).sin(), &|g| (n * u[g]).cos()]);
-        c.several(format!("sin {k}(u - u_noon), cos {k}(u - u_noon)"), "sun_phase", place, &[&|g| (n * noon[g]).sin(), &|g| (n * noon[g]).cos()]);
+        c.several(
+            format!("sin {k}u, cos {k}u"),
+            "argument_of_latitude",
+            place,
+            &[&|g| (n * u[g]).sin(), &|g| (n * u[g]).cos()],
+        );
+        c.several(
+            format!("sin {k}(u - u_noon), cos {k}(u - u_noon)"),
+            "sun_phase",
+            place,
+            &[&|g| (n * noon[g]).sin(), &|g| (n * noon[g]).cos()],
+        );
         if k <= 3 {
             for (name, b) in ["along-track", "cross-track", "radial"].into_iter().zip(&bodies) {
-                c.vectors(format!("sin {k}u, cos {k}u {name}"), "argument_of_latitude", place, &[&|g| b[g] * (n * u[g]).sin(), &|g| b[g] * (n * u[g]).cos()]);
-                c.vectors(format!("sin {k}(u - u_noon), cos {k}(u - u_noon) {name}"), "sun_phase", place, &[&|g| b[g] * (n * noon[g]).sin(), &|g| b[g] * (n * noon[g]).cos()]);
+                c.vectors(
+                    format!("sin {k}u, cos {k}u {name}"),
+                    "argument_of_latitude",
+                    place,
+                    &[&|g| b[g] * (n * u[g]).sin(), &|g| b[g] * (n * u[g]).cos()],
+                );
+                c.vectors(
+                    format!("sin {k}(u - u_noon), cos {k}(u - u_noon) {name}"),
+                    "sun_phase",
+                    place,
+                    &[&|g| b[g] * (n * noon[g]).sin(), &|g| b[g] * (n * noon[g]).cos()],
+                );
             }
         }
     }
-    c.vectors("a constant in the local vertical frame", "attitude", "changes of attitude", &[&|g| bodies[0][g], &|g| bodies[1][g], &|g| bodies[2][g]]);
+    c.vectors(
+        "a constant in the local vertical frame",
+        "attitude",
+        "changes of attitude",
+        &[&|g| bodies[0][g], &|g| bodies[1][g], &|g| bodies[2][g]],
+    );
     let fixed = |k: usize| move |g: usize| s.body[g].column(k).into_owned();
     c.vectors("a constant in inertial axes", "attitude", "changes of attitude", &[&fixed(0), &fixed(1), &fixed(2)]);
 }
@@ -172,9 +229,19 @@ fn sunlight(c: &mut Collector) {
     }
     c.grid("cos(Sun zenith angle)", "sun_angle", place, |g| s.sun[g].dot(&s.r_m[g].normalize()));
     c.grid("max(0, cos(Sun zenith angle))", "sun_angle", place, |g| s.sun[g].dot(&s.r_m[g].normalize()).max(0.0));
-    c.vectors("radial, day side", "sun_angle", place, &[&|g| s.body[g] * s.r_m[g].normalize() * s.sun[g].dot(&s.r_m[g].normalize()).max(0.0)]);
+    c.vectors(
+        "radial, day side",
+        "sun_angle",
+        place,
+        &[&|g| s.body[g] * s.r_m[g].normalize() * s.sun[g].dot(&s.r_m[g].normalize()).max(0.0)],
+    );
     c.grid("nu", "shadow", "sunlit parts of the orbit", |g| s.sunlit[g]);
-    c.grid("penumbra", "shadow", "edges of the shadow", |g| if s.sunlit[g] > 0.0 && s.sunlit[g] < 1.0 { 1.0 } else { 0.0 });
+    c.grid(
+        "penumbra",
+        "shadow",
+        "edges of the shadow",
+        |g| if s.sunlit[g] > 0.0 && s.sunlit[g] < 1.0 { 1.0 } else { 0.0 },
+    );
 }
 
 /// Instants at which a grid series crosses a level, with the sign of the crossing.
@@ -215,7 +282,12 @@ fn terminator(c: &mut Collector) {
     let place = "after the edges of the shadow";
     for tau in [60.0, 150.0, 300.0, 600.0, 1200.0, 2400.0] {
         let both: Vec<(f64, f64)> = all.iter().map(|x| (x.0, 1.0)).collect();
-        for (what, list) in [("every terminator crossing", both), ("every terminator crossing, signed", all.clone()), ("sunrise", only(1.0)), ("sunset", only(-1.0))] {
+        for (what, list) in [
+            ("every terminator crossing", both),
+            ("every terminator crossing, signed", all.clone()),
+            ("sunrise", only(1.0)),
+            ("sunset", only(-1.0)),
+        ] {
             c.windows(format!("exp(-(time since {what})/{tau:.0} s)"), "shadow", place, since(s, &list, tau));
         }
     }
@@ -229,7 +301,9 @@ fn field(c: &mut Collector) {
     for i in 0..3 {
         c.grid(format!("|B{}|", AXIS[i]), "geomagnetic_field", place, |g| s.field_body_t[g][i].abs());
         for j in i..3 {
-            c.grid(format!("B{} B{}", AXIS[i], AXIS[j]), "geomagnetic_field", place, |g| s.field_body_t[g][i] * s.field_body_t[g][j]);
+            c.grid(format!("B{} B{}", AXIS[i], AXIS[j]), "geomagnetic_field", place, |g| {
+                s.field_body_t[g][i] * s.field_body_t[g][j]
+            });
         }
         let last = s.grid_s.len() - 1;
         c.grid(format!("dB{}/dt", AXIS[i]), "geomagnetic_field", place, |g| {
@@ -260,11 +334,26 @@ fn surroundings(c: &mut Collector) {
     c.grid("sin(latitude)", "latitude", place, |g| latitude[g]);
     c.grid("sin^2(latitude)", "latitude", place, |g| latitude[g] * latitude[g]);
     c.grid("|sin(latitude)|", "latitude", place, |g| latitude[g].abs());
-    c.several("sin(longitude), cos(longitude)", "longitude", place, &[&|g| longitude[g].sin(), &|g| longitude[g].cos()]);
-    c.several("sin(2 longitude), cos(2 longitude)", "longitude", place, &[&|g| (2.0 * longitude[g]).sin(), &|g| (2.0 * longitude[g]).cos()]);
+    c.several(
+        "sin(longitude), cos(longitude)",
+        "longitude",
+        place,
+        &[&|g| longitude[g].sin(), &|g| longitude[g].cos()],
+    );
+    c.several(
+        "sin(2 longitude), cos(2 longitude)",
+        "longitude",
+        place,
+        &[&|g| (2.0 * longitude[g]).sin(), &|g| (2.0 * longitude[g]).cos()],
+    );
     for k in 1..=3 {
         let n = k as f64;
-        c.several(format!("sin {k}LT, cos {k}LT"), "local_time", place, &[&|g| (n * (ascension[g] - sun_ra)).sin(), &|g| (n * (ascension[g] - sun_ra)).cos()]);
+        c.several(
+            format!("sin {k}LT, cos {k}LT"),
+            "local_time",
+            place,
+            &[&|g| (n * (ascension[g] - sun_ra)).sin(), &|g| (n * (ascension[g] - sun_ra)).cos()],
+        );
     }
     c.grid("tanh(4 sin(LT))", "local_time", place, |g| (4.0 * (ascension[g] - sun_ra).sin()).tanh());
     c.grid("tanh(4 cos(LT))", "local_time", place, |g| (4.0 * (ascension[g] - sun_ra).cos()).tanh());
@@ -273,7 +362,14 @@ fn surroundings(c: &mut Collector) {
     c.vectors("a_d (h - <h>)", "altitude", along, &[&|g| s.drag_ng[g] * (height[g] - mean_height)]);
     c.vectors("a_d (t - <t>)", "time", along, &[&|g| s.drag_ng[g] * (s.grid_s[g] - s.grid_s[0])]);
     c.vectors("a_d sin^2(latitude)", "latitude", along, &[&|g| s.drag_ng[g] * latitude[g] * latitude[g]]);
-    c.vectors("a_d sin 2LT, a_d cos 2LT", "local_time", along, &[&|g| s.drag_ng[g] * (2.0 * (ascension[g] - sun_ra)).sin(), &|g| s.drag_ng[g] * (2.0 * (ascension[g] - sun_ra)).cos()]);
+    c.vectors(
+        "a_d sin 2LT, a_d cos 2LT",
+        "local_time",
+        along,
+        &[&|g| s.drag_ng[g] * (2.0 * (ascension[g] - sun_ra)).sin(), &|g| {
+            s.drag_ng[g] * (2.0 * (ascension[g] - sun_ra)).cos()
+        }],
+    );
     c.vectors("a_d nu", "shadow", along, &[&|g| s.drag_ng[g] * s.sunlit[g]]);
 }
 
@@ -286,9 +382,19 @@ fn sensor(c: &mut Collector) {
         c.windows(format!("|m{}|", AXIS[i]), "modelled_signal", place, m[i].iter().map(|x| x.abs()).collect());
         c.windows(format!("m{}^3", AXIS[i]), "modelled_signal", place, m[i].iter().map(|x| x.powi(3)).collect());
         for j in i..3 {
-            c.windows(format!("m{} m{}", AXIS[i], AXIS[j]), "modelled_signal", place, m[i].iter().zip(&m[j]).map(|(a, b)| a * b).collect());
+            c.windows(
+                format!("m{} m{}", AXIS[i], AXIS[j]),
+                "modelled_signal",
+                place,
+                m[i].iter().zip(&m[j]).map(|(a, b)| a * b).collect(),
+            );
         }
-        c.windows(format!("average deviation {}", AXIS[i]), "activity", "noisy windows", s.case.recording.dev_ng[i].clone());
+        c.windows(
+            format!("average deviation {}", AXIS[i]),
+            "activity",
+            "noisy windows",
+            s.case.recording.dev_ng[i].clone(),
+        );
     }
     let t = &s.temperature_c;
     let mean = t.iter().sum::<f64>() / t.len() as f64;
@@ -301,7 +407,14 @@ fn sensor(c: &mut Collector) {
     c.grid("|dT/dt|", "temperature", "changing temperature", |g| slope(g).abs());
     c.grid("(T - <T>)^2", "temperature", "extreme temperature", |g| (t[g] - mean).powi(2));
     c.grid("(T - <T>)^3", "temperature", "extreme temperature", |g| (t[g] - mean).powi(3));
-    c.vectors("m (T - <T>)", "temperature", "a large modelled signal", &[&|g| Vec3::new(s.simulated_grid_ng[0][g], s.simulated_grid_ng[1][g], s.simulated_grid_ng[2][g]) * (t[g] - mean)]);
+    c.vectors(
+        "m (T - <T>)",
+        "temperature",
+        "a large modelled signal",
+        &[&|g| {
+            Vec3::new(s.simulated_grid_ng[0][g], s.simulated_grid_ng[1][g], s.simulated_grid_ng[2][g]) * (t[g] - mean)
+        }],
+    );
 }
 
 fn events(c: &mut Collector) {
@@ -314,26 +427,52 @@ fn events(c: &mut Collector) {
         let starts: Vec<(f64, f64)> = spans.iter().map(|x| (x[0], 1.0)).collect();
         let ends: Vec<(f64, f64)> = spans.iter().map(|x| (x[1], 1.0)).collect();
         for tau in [200.0, 600.0, 2000.0, 6000.0] {
-            c.windows(format!("exp(-(time since start of {kind})/{tau:.0} s)"), "time_since_event", "after logged events", since(s, &starts, tau));
-            c.windows(format!("exp(-(time since end of {kind})/{tau:.0} s)"), "time_since_event", "after logged events", since(s, &ends, tau));
+            c.windows(
+                format!("exp(-(time since start of {kind})/{tau:.0} s)"),
+                "time_since_event",
+                "after logged events",
+                since(s, &starts, tau),
+            );
+            c.windows(
+                format!("exp(-(time since end of {kind})/{tau:.0} s)"),
+                "time_since_event",
+                "after logged events",
+                since(s, &ends, tau),
+            );
         }
         for lag in [120.0, 300.0, 900.0, 2700.0] {
             let late: Vec<[f64; 2]> = spans.iter().map(|x| [x[0] + lag, x[1] + lag]).collect();
-            c.windows(format!("{kind}, {lag:.0} s late"), "time_since_event", "after logged events", coverage(s.clock_s(), &late));
+            c.windows(
+                format!("{kind}, {lag:.0} s late"),
+                "time_since_event",
+                "after logged events",
+                coverage(s.clock_s(), &late),
+            );
         }
         let count: Vec<f64> = s.clock_s().iter().map(|t| starts.iter().filter(|x| x.0 <= *t).count() as f64).collect();
         c.windows(format!("number of {kind} so far"), "time_since_event", "after logged events", count);
         if !matches!(kind, "water_dump" | "evaporator" | "thruster" | "crew_sleep") {
-            c.windows(format!("{kind} lasts"), "time_since_event", "during logged events", coverage(s.clock_s(), &spans));
+            c.windows(
+                format!("{kind} lasts"),
+                "time_since_event",
+                "during logged events",
+                coverage(s.clock_s(), &spans),
+            );
         }
     }
     let speed: Vec<f64> = s.wdot_rad_s2.iter().map(|w| w.norm()).collect();
     let mut sorted = speed.clone();
     sorted.sort_by(f64::total_cmp);
     let level = 8.0 * sorted[sorted.len() / 2] + 1e-7;
-    let ends: Vec<(f64, f64)> = crossings(&s.grid_s, &speed, level).into_iter().filter(|x| x.1 < 0.0).map(|x| (x.0, 1.0)).collect();
+    let ends: Vec<(f64, f64)> =
+        crossings(&s.grid_s, &speed, level).into_iter().filter(|x| x.1 < 0.0).map(|x| (x.0, 1.0)).collect();
     for tau in [300.0, 1000.0, 3000.0, 10_000.0] {
-        c.windows(format!("exp(-(time since manoeuvre)/{tau:.0} s)"), "time_since_manoeuvre", "after manoeuvres", since(s, &ends, tau));
+        c.windows(
+            format!("exp(-(time since manoeuvre)/{tau:.0} s)"),
+            "time_since_manoeuvre",
+            "after manoeuvres",
+            since(s, &ends, tau),
+        );
     }
 }
 
@@ -345,10 +484,20 @@ fn clock(c: &mut Collector) {
     c.windows("t^3", "time", "the whole record", t.iter().map(|x| x.powi(3)).collect());
     for hours in [6.0, 8.0, 12.0, 24.0, 48.0] {
         let rate = std::f64::consts::TAU / (hours * 3600.0);
-        c.several(format!("sin, cos of a {hours:.0} h cycle"), "time", "a daily or shorter cycle", &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()]);
+        c.several(
+            format!("sin, cos of a {hours:.0} h cycle"),
+            "time",
+            "a daily or shorter cycle",
+            &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()],
+        );
     }
     for cycles in [0.25, 0.5, 0.75, 1.5, 2.5, 8.0, 12.0, 16.0] {
         let rate = std::f64::consts::TAU * cycles / s.period_s;
-        c.several(format!("sin, cos at {cycles} cycles per orbit"), "per_orbit_line", "a line of the spectrum", &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()]);
+        c.several(
+            format!("sin, cos at {cycles} cycles per orbit"),
+            "per_orbit_line",
+            "a line of the spectrum",
+            &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()],
+        );
     }
 }

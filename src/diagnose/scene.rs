@@ -66,7 +66,8 @@ impl<'a> Scene<'a> {
         let windows = &case.recording.clock_s;
         let to_windows = Measurement::new(&case.simulation.clock_s, windows, 0.0);
         let simulated_ng = to_windows.apply3(&case.simulation.a_ng);
-        let residual_ng = std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
+        let residual_ng =
+            std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
         let asleep: Vec<bool> = coverage(windows, &case.spans("crew_sleep")).iter().map(|c| *c > 0.5).collect();
         let vector = |v: &[f64; 3]| Vec3::new(v[0], v[1], v[2]);
         let r_m: Vec<Vec3> = anc.r_m.iter().map(vector).collect();
@@ -78,13 +79,17 @@ impl<'a> Scene<'a> {
         let sun: Vec<Vec3> = unix.iter().map(|t| physics::sun::direction(*t)).collect();
         let sunlit = r_m.iter().zip(&sun).map(|(r, s)| physics::shadow::sunlit_fraction(r, s)).collect();
         let field_body_t = fields(&unix, &r_m, &body)?;
-        let drag_ng = (0..r_m.len()).map(|i| drag_ng(&vehicle, anc.density_kg_m3[i], &r_m[i], &v_m_s[i], &body[i], 1.0, &Vec3::zeros())).collect();
+        let drag_ng = (0..r_m.len())
+            .map(|i| drag_ng(&vehicle, anc.density_kg_m3[i], &r_m[i], &v_m_s[i], &body[i], 1.0, &Vec3::zeros()))
+            .collect();
         let period_s = period_s(&r_m[0], &v_m_s[0]);
         Ok(Self {
             schedule: Schedule::new(windows),
             activity: std::array::from_fn(|k| activity(&case.recording.dev_ng[k], &asleep)),
             residual_ng,
-            simulated_grid_ng: std::array::from_fn(|k| interpolate(&case.simulation.clock_s, &case.simulation.a_ng[k], &anc.clock_s)),
+            simulated_grid_ng: std::array::from_fn(|k| {
+                interpolate(&case.simulation.clock_s, &case.simulation.a_ng[k], &anc.clock_s)
+            }),
             simulated_ng,
             measurement: Measurement::new(&anc.clock_s, windows, 0.0),
             vehicle,
@@ -127,7 +132,15 @@ impl<'a> Scene<'a> {
 
     /// Drag at grid point `i` with another co-rotation or wind, ng, body axes.
     pub fn drag_with(&self, i: usize, corotation: f64, wind_m_s: &Vec3) -> Vec3 {
-        drag_ng(&self.vehicle, self.case.ancillary.density_kg_m3[i], &self.r_m[i], &self.v_m_s[i], &self.body[i], corotation, wind_m_s)
+        drag_ng(
+            &self.vehicle,
+            self.case.ancillary.density_kg_m3[i],
+            &self.r_m[i],
+            &self.v_m_s[i],
+            &self.body[i],
+            corotation,
+            wind_m_s,
+        )
     }
 
     /// Tensor T of a = T r: what a sensor offset of one metre feels, 1/s^2, at grid point `i`, body axes.
@@ -167,18 +180,32 @@ fn bodies(q: &[[f64; 4]]) -> Result<Vec<Mat3>, CaseError> {
     q.iter()
         .map(|q| {
             let attitude = physics::attitude::from_scalar_first(q[0], q[1], q[2], q[3]);
-            attitude.map(|a| physics::attitude::body_from_inertial(&a)).ok_or_else(|| CaseError::Numeric(format!("ancillary data: {q:?} is no attitude")))
+            attitude
+                .map(|a| physics::attitude::body_from_inertial(&a))
+                .ok_or_else(|| CaseError::Numeric(format!("ancillary data: {q:?} is no attitude")))
         })
         .collect()
 }
 
 fn fields(unix: &[f64], r_m: &[Vec3], body: &[Mat3]) -> Result<Vec<Vec3>, CaseError> {
     (0..unix.len())
-        .map(|i| physics::magnetic::geomagnetic_field_t(unix[i], &r_m[i]).map(|b| body[i] * b).map_err(|e| CaseError::Numeric(e.to_string())))
+        .map(|i| {
+            physics::magnetic::geomagnetic_field_t(unix[i], &r_m[i])
+                .map(|b| body[i] * b)
+                .map_err(|e| CaseError::Numeric(e.to_string()))
+        })
         .collect()
 }
 
-fn drag_ng(vehicle: &physics::vehicle::Vehicle, density: f64, r: &Vec3, v: &Vec3, body: &Mat3, corotation: f64, wind: &Vec3) -> Vec3 {
+fn drag_ng(
+    vehicle: &physics::vehicle::Vehicle,
+    density: f64,
+    r: &Vec3,
+    v: &Vec3,
+    body: &Mat3,
+    corotation: f64,
+    wind: &Vec3,
+) -> Vec3 {
     let relative = body * physics::drag::relative_velocity_m_s(r, v, corotation, wind);
     physics::drag::acceleration_m_s2(vehicle, density, &relative) / NANO_G_M_S2
 }

@@ -48,7 +48,10 @@ pub struct Entry {
 impl Entry {
     /// A catalogue effect, `None` where the case does not allow it.
     pub fn listed(scene: &Scene, effect: &'static Effect) -> Option<Self> {
-        let points: Vec<(Theta, Shape)> = (effect.grid)(scene).into_iter().filter_map(|theta| (effect.signature)(scene, &theta).map(|s| (theta, s))).collect();
+        let points: Vec<(Theta, Shape)> = (effect.grid)(scene)
+            .into_iter()
+            .filter_map(|theta| (effect.signature)(scene, &theta).map(|s| (theta, s)))
+            .collect();
         (!points.is_empty()).then(|| Self {
             family: Family::Listed(effect),
             log_prior: effect.log_prior,
@@ -60,8 +63,17 @@ impl Entry {
 
     /// An open form.
     pub fn open(index: usize, atom: &Atom, log_prior: f64) -> Self {
-        let sizes = vec![super::open_form::SIZE_NG; if matches!(atom.shape, Shape::Scalar(_)) { 3 } else { atom.shape.columns().len() }];
-        Self { family: Family::Open(index), log_prior, log_volume: 0.0, points: vec![([0.0; 2], atom.shape.clone())], sizes }
+        let sizes = vec![
+            super::open_form::SIZE_NG;
+            if matches!(atom.shape, Shape::Scalar(_)) { 3 } else { atom.shape.columns().len() }
+        ];
+        Self {
+            family: Family::Open(index),
+            log_prior,
+            log_volume: 0.0,
+            points: vec![([0.0; 2], atom.shape.clone())],
+            sizes,
+        }
     }
 
     fn effect(&self) -> Option<&'static Effect> {
@@ -99,7 +111,10 @@ fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64]) -> Whitened
 impl<'a> Bank<'a> {
     /// Whiten all.
     pub fn new(frame: &Frame, entries: &'a [Entry]) -> Self {
-        let points = entries.iter().map(|e| e.points.iter().map(|(theta, shape)| whiten(frame, *theta, shape, &e.sizes)).collect()).collect();
+        let points = entries
+            .iter()
+            .map(|e| e.points.iter().map(|(theta, shape)| whiten(frame, *theta, shape, &e.sizes)).collect())
+            .collect();
         Self { entries, points }
     }
 }
@@ -140,7 +155,8 @@ impl Set {
     /// Columns chosen, for more to be added.
     pub fn chosen(&self, frame: &Frame) -> Chosen<'_> {
         let linear = self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| &m.point.columns).collect();
-        let fixed: Vec<&Column> = self.members.iter().filter(|m| m.point.fixed).flat_map(|m| &m.point.columns).collect();
+        let fixed: Vec<&Column> =
+            self.members.iter().filter(|m| m.point.fixed).flat_map(|m| &m.point.columns).collect();
         Chosen::new(frame, linear, &fixed)
     }
 
@@ -161,7 +177,8 @@ impl Set {
 
     /// Mean and covariance of all linear coefficients in their own units, members in order.
     pub fn coefficients(&self, frame: &Frame, entries: &[Entry]) -> (DVector<f64>, DMatrix<f64>) {
-        let sizes: Vec<f64> = self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| member_sizes(m, entries)).collect();
+        let sizes: Vec<f64> =
+            self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| member_sizes(m, entries)).collect();
         let (mean, covariance) = self.chosen(frame).posterior();
         let scale = DMatrix::from_diagonal(&DVector::from_vec(sizes));
         (&scale * mean, &scale * covariance * &scale)
@@ -228,11 +245,21 @@ fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, theta: &Theta, axis: Op
 /// The best way to add one entry to a chosen set: the score gained with priors, and the member.
 pub fn best_of_entry(bank: &Bank, index: usize, chosen: &Chosen) -> (f64, Member) {
     let entry = &bank.entries[index];
-    let gains: Vec<f64> = bank.points[index].iter().map(|p| if p.fixed { chosen.gain_fixed(&p.columns[0]) } else { chosen.gain(&p.columns) }).collect();
+    let gains: Vec<f64> = bank.points[index]
+        .iter()
+        .map(|p| if p.fixed { chosen.gain_fixed(&p.columns[0]) } else { chosen.gain(&p.columns) })
+        .collect();
     let best = (0..gains.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b])).unwrap_or(0);
     let top = gains[best];
     let marginal = top + gains.iter().map(|g| (g - top).exp()).sum::<f64>().ln() - (gains.len() as f64).ln();
-    let mut member = Member { entry: index, axis: None, theta: bank.points[index][best].theta, log_occam: marginal - top, theta_sigma: [0.0; 2], point: bank.points[index][best].clone() };
+    let mut member = Member {
+        entry: index,
+        axis: None,
+        theta: bank.points[index][best].theta,
+        log_occam: marginal - top,
+        theta_sigma: [0.0; 2],
+        point: bank.points[index][best].clone(),
+    };
     let mut gain = marginal;
     if matches!(entry.family, Family::Open(_)) && matches!(entry.points[0].1, Shape::Scalar(_)) {
         // All axes, or one of them: a quarter each.
@@ -301,7 +328,10 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         if free.is_empty() {
             continue;
         }
-        let others = Set { members: set.members.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, m)| m.clone()).collect(), score: 0.0 };
+        let others = Set {
+            members: set.members.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, m)| m.clone()).collect(),
+            score: 0.0,
+        };
         let chosen = others.chosen(frame);
         let mut theta = set.members[i].theta;
         let gain = |theta: &Theta| -> f64 {
@@ -337,7 +367,14 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
 }
 
 /// Laplace volume of the nonlinear parameters around their peak against their prior's, and their standard errors.
-fn volume(gain: &impl Fn(&Theta) -> f64, theta: &Theta, free: &[usize], effect: &Effect, log_volume: f64, peak: f64) -> (f64, Theta) {
+fn volume(
+    gain: &impl Fn(&Theta) -> f64,
+    theta: &Theta,
+    free: &[usize],
+    effect: &Effect,
+    log_volume: f64,
+    peak: f64,
+) -> (f64, Theta) {
     let n = free.len();
     let mut h: Vec<f64> = free.iter().map(|j| effect.nonlinear[*j].step * 0.1).collect();
     // A wall on one side (a lag cannot be negative) is mirrored: the fall is counted on the open side.
@@ -375,7 +412,10 @@ fn volume(gain: &impl Fn(&Theta) -> f64, theta: &Theta, free: &[usize], effect: 
     for a in 0..n {
         hessian[(a, a)] = (2.0 * peak - at(&[(a, 1.0)]) - at(&[(a, -1.0)])).clamp(0.05, 1e6) / (h[a] * h[a]);
         for b in 0..a {
-            let mixed = (at(&[(a, 1.0), (b, -1.0)]) + at(&[(a, -1.0), (b, 1.0)]) - at(&[(a, 1.0), (b, 1.0)]) - at(&[(a, -1.0), (b, -1.0)])) / (4.0 * h[a] * h[b]);
+            let mixed = (at(&[(a, 1.0), (b, -1.0)]) + at(&[(a, -1.0), (b, 1.0)])
+                - at(&[(a, 1.0), (b, 1.0)])
+                - at(&[(a, -1.0), (b, -1.0)]))
+                / (4.0 * h[a] * h[b]);
             let bound = 0.95 * (hessian[(a, a)] * hessian[(b, b)]).sqrt();
             let mixed = if mixed.is_finite() { mixed.clamp(-bound, bound) } else { 0.0 };
             hessian[(a, b)] = mixed;
@@ -413,12 +453,26 @@ pub fn residual(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) -> A
 }
 
 /// Fit the noise of all axes to a residual.
-pub fn fit_noise(scene: &Scene, residual_ng: &Axes, start: Option<&[AxisNoise; 3]>, evaluations: usize) -> [AxisNoise; 3] {
-    std::array::from_fn(|k| noise::fit(&residual_ng[k], &scene.schedule, &scene.activity[k], start.map(|s| &s[k]), evaluations).noise)
+pub fn fit_noise(
+    scene: &Scene,
+    residual_ng: &Axes,
+    start: Option<&[AxisNoise; 3]>,
+    evaluations: usize,
+) -> [AxisNoise; 3] {
+    std::array::from_fn(|k| {
+        noise::fit(&residual_ng[k], &scene.schedule, &scene.activity[k], start.map(|s| &s[k]), evaluations).noise
+    })
 }
 
 /// Weigh a set with its own noise: alternately noise and coefficients, `rounds` times.
-pub fn weigh_with_own_noise(scene: &Scene, entries: &[Entry], set: &Set, start: &[AxisNoise; 3], rounds: usize, evaluations: usize) -> Weighed {
+pub fn weigh_with_own_noise(
+    scene: &Scene,
+    entries: &[Entry],
+    set: &Set,
+    start: &[AxisNoise; 3],
+    rounds: usize,
+    evaluations: usize,
+) -> Weighed {
     let mut noise = *start;
     let mut set = set.clone();
     let mut frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);

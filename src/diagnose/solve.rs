@@ -27,7 +27,11 @@ pub struct Library {
 impl Library {
     /// The whole catalogue but the ids of `without`, and the dictionary.
     pub fn new(scene: &Scene, without: &[String]) -> Self {
-        let mut entries: Vec<Entry> = catalogue::ALL.iter().filter(|e| !without.iter().any(|id| id == e.id)).filter_map(|e| Entry::listed(scene, e)).collect();
+        let mut entries: Vec<Entry> = catalogue::ALL
+            .iter()
+            .filter(|e| !without.iter().any(|id| id == e.id))
+            .filter_map(|e| Entry::listed(scene, e))
+            .collect();
         let listed = entries.len();
         let atoms = open_form::dictionary(scene);
         let share = OPEN_LOG_PRIOR - (atoms.len().max(1) as f64).ln();
@@ -118,7 +122,9 @@ pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -
         let top = sets.first().map_or(0.0, |s| s.score);
         let worth = top > WORTH_A_REFIT;
         let keep = sets.into_iter().filter(|s| s.score > top - 14.0).take(if worth { count } else { 1 });
-        let mut weighed: Vec<Weighed> = keep.map(|s| search::weigh_with_own_noise(scene, entries, &s, &noise, if worth { 2 } else { 1 }, 40)).collect();
+        let mut weighed: Vec<Weighed> = keep
+            .map(|s| search::weigh_with_own_noise(scene, entries, &s, &noise, if worth { 2 } else { 1 }, 40))
+            .collect();
         weighed.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
         weighed
     };

@@ -48,9 +48,20 @@ fn effect_of<'a>(entries: &'a [Entry], set: &Set, i: usize) -> Option<&'static E
 }
 
 /// The answer, the claimed series at the windows, and the ladder of evidence.
-pub fn conclude(scene: &Scene, library: &Library, solution: &Solution, probability: f64, claim: f64) -> (Diagnosis, Axes, Vec<(String, f64)>) {
+pub fn conclude(
+    scene: &Scene,
+    library: &Library,
+    solution: &Solution,
+    probability: f64,
+    claim: f64,
+) -> (Diagnosis, Axes, Vec<(String, f64)>) {
     let null = solution.null.log_posterior;
-    let mut ladder: Vec<(String, f64)> = solution.listed.iter().chain(&solution.open).map(|w| (ids(library, &w.set).join(" + "), w.log_posterior - null)).collect();
+    let mut ladder: Vec<(String, f64)> = solution
+        .listed
+        .iter()
+        .chain(&solution.open)
+        .map(|w| (ids(library, &w.set).join(" + "), w.log_posterior - null))
+        .collect();
     ladder.push(("nothing".into(), 0.0));
     ladder.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut notes = Vec::new();
@@ -59,7 +70,9 @@ pub fn conclude(scene: &Scene, library: &Library, solution: &Solution, probabili
     let open: Vec<&Weighed> = solution.open.iter().collect();
     let refused = solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior) - top(&listed) > OPEN_MARGIN;
     let open_wins = top(&open) - top(&listed).max(null) > OPEN_MARGIN;
-    let claimed = probability <= claim && top(&listed).max(top(&open)).max(solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior)) > null;
+    let claimed = probability <= claim
+        && top(&listed).max(top(&open)).max(solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior))
+            > null;
     let verdict = match (claimed, open_wins || refused) {
         (false, _) => Verdict::Consistent,
         (true, true) => Verdict::Unexplained,
@@ -72,7 +85,8 @@ pub fn conclude(scene: &Scene, library: &Library, solution: &Solution, probabili
         _ => Some(simplest(&listed)),
     };
     let mut answer = empty(scene, verdict, probability);
-    answer.located.covariates = locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
+    answer.located.covariates =
+        locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
     let null_frame = Frame::new(&solution.null.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
     let Some(weighed) = chosen else {
         answer.notes = notes;
@@ -90,7 +104,11 @@ pub fn conclude(scene: &Scene, library: &Library, solution: &Solution, probabili
     answer.fit = Some(fit);
     let signal = sum(scene, &best.contributions);
     let covariates = std::mem::take(&mut answer.located.covariates);
-    answer.located = Located { covariates, per_orbit_lines: locate::lines(scene, &best.frame), ..locate::of_signal(scene, &signal, why_here(&best)) };
+    answer.located = Located {
+        covariates,
+        per_orbit_lines: locate::lines(scene, &best.frame),
+        ..locate::of_signal(scene, &signal, why_here(&best))
+    };
     answer.upper_limits = upper_limits(scene, library, &best.frame, &best.set);
     match verdict {
         Verdict::Unexplained => answer.hypothesis = Some(hypothesis(library, &best, &listed, open_wins)),
@@ -133,7 +151,14 @@ fn credible<'a>(scene: &Scene, library: &Library, sets: &'a [Weighed], notes: &m
             let Some(effect) = effect_of(&library.entries, &set, i) else { continue };
             for (k, l) in effect.linear.iter().enumerate().take(m.linear()) {
                 if mean[next + k].abs() > l.size_max {
-                    reason = Some(format!("{} is refused: it would need {} = {:.3} {}, and {} is the most that can be believed", effect.id, l.name, mean[next + k], l.unit, l.size_max));
+                    reason = Some(format!(
+                        "{} is refused: it would need {} = {:.3} {}, and {} is the most that can be believed",
+                        effect.id,
+                        l.name,
+                        mean[next + k],
+                        l.unit,
+                        l.size_max
+                    ));
                 }
             }
             next += m.linear();
@@ -173,9 +198,14 @@ fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Best, l
     let total: f64 = listed.iter().map(|w| (w.log_posterior - top).exp()).sum();
     let posterior = |w: &Weighed| (w.log_posterior - top).exp() / total;
     let key = best.set.key();
-    answer.effects = effects(library, best, |entry| listed.iter().filter(|w| w.set.key().contains(&entry)).map(|w| posterior(w)).sum());
+    answer.effects = effects(library, best, |entry| {
+        listed.iter().filter(|w| w.set.key().contains(&entry)).map(|w| posterior(w)).sum()
+    });
     let others: Vec<&&Weighed> = listed.iter().filter(|w| w.set.key() != key).collect();
-    let rivals: Vec<&&&Weighed> = others.iter().filter(|w| best.weighed.log_posterior - w.log_posterior < EQUAL && !is_nested(&w.set, &best.set)).collect();
+    let rivals: Vec<&&&Weighed> = others
+        .iter()
+        .filter(|w| best.weighed.log_posterior - w.log_posterior < EQUAL && !is_nested(&w.set, &best.set))
+        .collect();
     if !rivals.is_empty() {
         answer.verdict = Verdict::Ambiguous;
         answer.cannot_tell_apart.push(ids(library, &best.set));
@@ -185,7 +215,11 @@ fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Best, l
         .iter()
         .filter(|w| posterior(w) > MENTION && !rivals.iter().any(|r| r.set.key() == w.set.key()))
         .filter(|w| !is_nested(&w.set, &best.set) || w.log_posterior > best.weighed.log_posterior - EQUAL)
-        .map(|w| Alternative { effects: ids(library, &w.set), posterior: posterior(w), delta_bic: 2.0 * (best.weighed.log_posterior - w.log_posterior) })
+        .map(|w| Alternative {
+            effects: ids(library, &w.set),
+            posterior: posterior(w),
+            delta_bic: 2.0 * (best.weighed.log_posterior - w.log_posterior),
+        })
         .collect();
 }
 
@@ -197,7 +231,11 @@ fn effects(library: &Library, best: &Best, posterior: impl Fn(usize) -> f64) -> 
             id: effect.id.into(),
             name: effect.name.into(),
             posterior: posterior(m.entry).min(1.0),
-            parameters: best.fits[i].parameters.iter().map(|p| ParameterAnswer { name: p.name.into(), value: p.value, sigma: p.sigma, unit: p.unit.into() }).collect(),
+            parameters: best.fits[i]
+                .parameters
+                .iter()
+                .map(|p| ParameterAnswer { name: p.name.into(), value: p.value, sigma: p.sigma, unit: p.unit.into() })
+                .collect(),
             axis: best.fits[i].axis.clone(),
             why: effect.why.into(),
             rms_ng: Some(std::array::from_fn(|k| rms(&best.contributions[i][k]))),
@@ -213,23 +251,44 @@ fn why_here(best: &Best) -> &'static str {
 }
 
 fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins: bool) -> Hypothesis {
-    let near = |w: &&Weighed| format!("{} lacks {:.1} in log evidence", ids(library, &w.set).join(" + "), best.weighed.log_posterior - w.log_posterior);
+    let near = |w: &&Weighed| {
+        format!(
+            "{} lacks {:.1} in log evidence",
+            ids(library, &w.set).join(" + "),
+            best.weighed.log_posterior - w.log_posterior
+        )
+    };
     let fails = listed.iter().take(3).map(near).collect::<Vec<_>>().join("; ");
     if !open_wins {
-        return Hypothesis { formula: "none".into(), axis: "x, y, z".into(), unit: "ng".into(), location: format!("No credible set of listed effects. {fails}") };
+        return Hypothesis {
+            formula: "none".into(),
+            axis: "x, y, z".into(),
+            unit: "ng".into(),
+            location: format!("No credible set of listed effects. {fails}"),
+        };
     }
     let mut formula = Vec::new();
     let mut axis = Vec::new();
     let mut location = Vec::new();
     for (i, m) in best.set.members.iter().enumerate() {
         let Family::Open(atom) = library.entries[m.entry].family else { continue };
-        let amplitudes: Vec<String> = best.fits[i].parameters.iter().map(|p| format!("{:.1}({:.1})", p.value, p.sigma)).collect();
-        formula.push(format!("[{}] x {}, scaled to unit deviation", amplitudes.join(", "), library.atoms[atom].formula));
+        let amplitudes: Vec<String> =
+            best.fits[i].parameters.iter().map(|p| format!("{:.1}({:.1})", p.value, p.sigma)).collect();
+        formula.push(format!(
+            "[{}] x {}, scaled to unit deviation",
+            amplitudes.join(", "),
+            library.atoms[atom].formula
+        ));
         axis.push(m.axis.map_or("x, y, z", |a| ["x", "y", "z"][a]));
         location.push(library.atoms[atom].location);
     }
     let failing = if fails.is_empty() { String::new() } else { format!(" Near catalogue effects fail: {fails}.") };
-    Hypothesis { formula: formula.join(" + "), axis: axis.join("; "), unit: "ng".into(), location: format!("It lives in {}.{failing}", location.join(" and ")) }
+    Hypothesis {
+        formula: formula.join(" + "),
+        axis: axis.join("; "),
+        unit: "ng".into(),
+        location: format!("It lives in {}.{failing}", location.join(" and ")),
+    }
 }
 
 fn covariate(library: &Library, entry: usize) -> String {
@@ -250,19 +309,33 @@ fn sum(scene: &Scene, parts: &[Axes]) -> Axes {
 }
 
 /// Before and after, and by how much the errors must be widened.
-fn fit(scene: &Scene, library: &Library, frame: &Frame, weighed: &Weighed, set: &Set, notes: &mut Vec<String>) -> (Fit, f64) {
+fn fit(
+    scene: &Scene,
+    library: &Library,
+    frame: &Frame,
+    weighed: &Weighed,
+    set: &Set,
+    notes: &mut Vec<String>,
+) -> (Fit, f64) {
     let entries = &library.entries;
     let left = search::residual(scene, frame, entries, set);
     let after = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &left);
     let dof = 3.0 * (scene.schedule.len() as f64 - 1.0);
-    let level = |axes: &Axes, f: &Frame, used: f64| FitLevel { rms_ng: std::array::from_fn(|k| rms(&axes[k])), whitened_chi2_per_dof: f.data.dot(&f.data) / (dof - used) };
+    let level = |axes: &Axes, f: &Frame, used: f64| FitLevel {
+        rms_ng: std::array::from_fn(|k| rms(&axes[k])),
+        whitened_chi2_per_dof: f.data.dot(&f.data) / (dof - used),
+    };
     let used: f64 = set.members.iter().map(|m| m.linear() as f64).sum();
     let mut inflation = 1.0_f64;
     for k in 0..3 {
         let (p, ratio) = whiteness(&after.data.projected(k, &after));
         if p < WHITENESS_P {
             inflation = inflation.max(ratio.sqrt());
-            notes.push(format!("the whitened residual of axis {} is not white (p = {p:.1e}): errors are widened by {:.2}", ["x", "y", "z"][k], ratio.sqrt()));
+            notes.push(format!(
+                "the whitened residual of axis {} is not white (p = {p:.1e}): errors are widened by {:.2}",
+                ["x", "y", "z"][k],
+                ratio.sqrt()
+            ));
         }
     }
     let held_out = model::held_out(scene, frame, entries, set, &weighed.noise);
@@ -311,7 +384,10 @@ fn upper_limits(scene: &Scene, library: &Library, frame: &Frame, set: &Set) -> V
         let stride = entry.points.len().div_ceil(12);
         let limits = entry.points.iter().step_by(stride).map(|(_, shape)| {
             let raws = shape.columns();
-            let scales: Vec<f64> = raws.iter().map(|raw| (raw.iter().flatten().map(|s| rms(s).powi(2)).sum::<f64>()).sqrt().max(1e-30)).collect();
+            let scales: Vec<f64> = raws
+                .iter()
+                .map(|raw| (raw.iter().flatten().map(|s| rms(s).powi(2)).sum::<f64>()).sqrt().max(1e-30))
+                .collect();
             let columns: Vec<Column> = raws.iter().zip(&scales).map(|(raw, s)| frame.column(raw, 300.0 / s)).collect();
             let (value, sigma) = conditional(&chosen, &columns);
             value + 1.645 * sigma

@@ -24,7 +24,9 @@ pub const EFFECT: Effect = Effect {
 const TAU_RANGE_S: [f64; 2] = [3000.0, 500_000.0];
 
 fn grid(_: &Scene) -> Vec<Theta> {
-    [4000.0_f64, 7000.0, 12_000.0, 20_000.0, 35_000.0, 60_000.0, 120_000.0, 300_000.0].map(|tau| [tau.ln(), 0.0]).to_vec()
+    [4000.0_f64, 7000.0, 12_000.0, 20_000.0, 35_000.0, 60_000.0, 120_000.0, 300_000.0]
+        .map(|tau| [tau.ln(), 0.0])
+        .to_vec()
 }
 
 fn log_volume(_: &Scene) -> f64 {

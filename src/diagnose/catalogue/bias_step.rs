@@ -12,7 +12,13 @@ pub const EFFECT: Effect = Effect {
     source: "electronic bias shifts were seen between calibrations",
     mistaken_for: &["vent_leak", "a trend of density"],
     linear: &push(60.0, 2000.0),
-    nonlinear: &[Nonlinear { name: "onset_s", unit: "s", log: false, step: 300.0, range: [f64::NEG_INFINITY, f64::INFINITY] }],
+    nonlinear: &[Nonlinear {
+        name: "onset_s",
+        unit: "s",
+        log: false,
+        step: 300.0,
+        range: [f64::NEG_INFINITY, f64::INFINITY],
+    }],
     log_prior: COMMON,
     grid: grid,
     log_volume: log_volume,
@@ -31,5 +37,6 @@ fn log_volume(scene: &Scene) -> f64 {
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let [start, end] = scene.span_s();
-    (theta[0] > start + 300.0 && theta[0] < end - 300.0).then(|| Shape::Scalar(decay(scene.clock_s(), theta[0], f64::INFINITY)))
+    (theta[0] > start + 300.0 && theta[0] < end - 300.0)
+        .then(|| Shape::Scalar(decay(scene.clock_s(), theta[0], f64::INFINITY)))
 }

@@ -19,7 +19,13 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "dy_m", unit: "m", size: 0.4, size_max: 3.0 },
         Linear { name: "dz_m", unit: "m", size: 0.4, size_max: 3.0 },
     ],
-    nonlinear: &[Nonlinear { name: "onset_s", unit: "s", log: false, step: 0.0, range: [f64::NEG_INFINITY, f64::INFINITY] }],
+    nonlinear: &[Nonlinear {
+        name: "onset_s",
+        unit: "s",
+        log: false,
+        step: 0.0,
+        range: [f64::NEG_INFINITY, f64::INFINITY],
+    }],
     log_prior: COMMON,
     grid: grid,
     log_volume: log_volume,
@@ -30,7 +36,15 @@ pub const EFFECT: Effect = Effect {
 fn grid(scene: &Scene) -> Vec<Theta> {
     let [start, end] = scene.span_s();
     let inside = |t: &f64| *t > start + 600.0 && *t < end - 600.0;
-    scene.case.events.iter().filter(|e| e.kind == "mass_change").map(|e| e.clock_s).filter(inside).map(|t| [t, 0.0]).collect()
+    scene
+        .case
+        .events
+        .iter()
+        .filter(|e| e.kind == "mass_change")
+        .map(|e| e.clock_s)
+        .filter(inside)
+        .map(|t| [t, 0.0])
+        .collect()
 }
 
 fn log_volume(scene: &Scene) -> f64 {

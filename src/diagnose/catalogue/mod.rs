@@ -130,7 +130,9 @@ impl Shape {
     /// As columns; a fixed shape is one column.
     pub fn columns(&self) -> Vec<Raw> {
         match self {
-            Shape::Scalar(series) => (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| series.clone()))).collect(),
+            Shape::Scalar(series) => {
+                (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| series.clone()))).collect()
+            }
             Shape::Columns(columns) => columns.clone(),
             Shape::Fixed(axes) => vec![full(axes.clone())],
         }

@@ -23,7 +23,11 @@ pub const EFFECT: Effect = Effect {
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
     let push = |i: usize| {
-        solar_radiation::acceleration_per_coefficient_m_s2(&scene.vehicle, scene.sunlit[i], &(scene.body[i] * scene.sun[i])) / NANO_G_M_S2
+        solar_radiation::acceleration_per_coefficient_m_s2(
+            &scene.vehicle,
+            scene.sunlit[i],
+            &(scene.body[i] * scene.sun[i]),
+        ) / NANO_G_M_S2
     };
     Some(Shape::Columns(vec![full(scene.measure(push))]))
 }

@@ -28,7 +28,9 @@ pub const EFFECT: Effect = Effect {
 const LAG_S_MAX: f64 = 28_800.0;
 
 fn grid(_: &Scene) -> Vec<Theta> {
-    [0.0, 300.0, 600.0, 1200.0, 1800.0, 2700.0, 3600.0, 5400.0, 7200.0, 10_800.0, 14_400.0, 21_600.0, LAG_S_MAX].map(|lag| [lag, 0.0]).to_vec()
+    [0.0, 300.0, 600.0, 1200.0, 1800.0, 2700.0, 3600.0, 5400.0, 7200.0, 10_800.0, 14_400.0, 21_600.0, LAG_S_MAX]
+        .map(|lag| [lag, 0.0])
+        .to_vec()
 }
 
 fn log_volume(_: &Scene) -> f64 {

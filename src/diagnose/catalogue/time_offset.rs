@@ -24,7 +24,8 @@ pub const EFFECT: Effect = Effect {
 const OFFSET_S_MAX: f64 = 600.0;
 
 fn grid(_: &Scene) -> Vec<Theta> {
-    let steps = [5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 75.0, 90.0, 105.0, 120.0, 150.0, 180.0, 240.0, 300.0, 400.0, 500.0];
+    let steps =
+        [5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 75.0, 90.0, 105.0, 120.0, 150.0, 180.0, 240.0, 300.0, 400.0, 500.0];
     steps.iter().flat_map(|s| [[*s, 0.0], [-s, 0.0]]).collect()
 }
 
@@ -36,6 +37,9 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     if theta[0].abs() > OFFSET_S_MAX {
         return None;
     }
-    let late = Measurement::new(&scene.case.simulation.clock_s, scene.clock_s(), theta[0]).apply3(&scene.case.simulation.a_ng);
-    Some(Shape::Fixed(std::array::from_fn(|k| late[k].iter().zip(&scene.simulated_ng[k]).map(|(a, b)| a - b).collect())))
+    let late =
+        Measurement::new(&scene.case.simulation.clock_s, scene.clock_s(), theta[0]).apply3(&scene.case.simulation.a_ng);
+    Some(Shape::Fixed(std::array::from_fn(|k| {
+        late[k].iter().zip(&scene.simulated_ng[k]).map(|(a, b)| a - b).collect()
+    })))
 }

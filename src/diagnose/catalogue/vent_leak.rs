@@ -30,7 +30,9 @@ const TAUS_S: [f64; 7] = [600.0, 1200.0, 2400.0, 4800.0, 9600.0, 19_200.0, 38_40
 const TAU_RANGE_S: [f64; 2] = [300.0, 80_000.0];
 
 fn grid(scene: &Scene) -> Vec<Theta> {
-    let points = |tau: &f64| onsets(scene, (0.5 * tau).clamp(300.0, 1800.0), 600.0).into_iter().map(|t| [t, tau.ln()]).collect::<Vec<_>>();
+    let points = |tau: &f64| {
+        onsets(scene, (0.5 * tau).clamp(300.0, 1800.0), 600.0).into_iter().map(|t| [t, tau.ln()]).collect::<Vec<_>>()
+    };
     TAUS_S.iter().flat_map(points).collect()
 }
 
@@ -41,6 +43,7 @@ fn log_volume(scene: &Scene) -> f64 {
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let [start, end] = scene.span_s();
-    let inside = theta[0] > start && theta[0] < end - 300.0 && theta[1] > TAU_RANGE_S[0].ln() && theta[1] < TAU_RANGE_S[1].ln();
+    let inside =
+        theta[0] > start && theta[0] < end - 300.0 && theta[1] > TAU_RANGE_S[0].ln() && theta[1] < TAU_RANGE_S[1].ln();
     inside.then(|| Shape::Scalar(decay(scene.clock_s(), theta[0], theta[1].exp())))
 }
