@@ -20,6 +20,12 @@ enum Command {
     Process(command::process::Args),
     /// Says what physics a simulation left out, from a case directory.
     Diagnose(command::diagnose::Args),
+    /// The service: dumps in at a TCP port, products out over HTTP and WebSocket.
+    Serve(command::serve::Args),
+    /// Sends dump files as a recorder playback would arrive.
+    Replay(command::replay::Args),
+    /// Products out of a data directory.
+    Export(command::export::Args),
     /// Makes, seals, runs and scores concealed cases.
     Challenge(command::challenge::Args),
 }
@@ -28,6 +34,9 @@ fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Process(args) => command::process::run(args),
         Command::Diagnose(args) => command::diagnose::run(args),
+        Command::Serve(args) => command::serve::run(args),
+        Command::Replay(args) => command::replay::run(args),
+        Command::Export(args) => command::export::run(args),
         Command::Challenge(args) => command::challenge::run(args),
     };
     done.unwrap_or_else(|error| {

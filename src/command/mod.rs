@@ -1,11 +1,14 @@
 //! The commands of `oare`, one a file: arguments in, exit code out. The work is in the library.
 
 pub mod challenge;
+pub mod export;
 
 use std::process::ExitCode;
 
 pub mod diagnose;
 pub mod process;
+pub mod replay;
+pub mod serve;
 
 /// Done.
 pub const DONE: ExitCode = ExitCode::SUCCESS;
@@ -23,4 +26,15 @@ pub fn unusable() -> ExitCode {
 /// Done, and some input could not be used.
 pub fn done_in_part() -> ExitCode {
     ExitCode::from(3)
+}
+
+/// Logs go to standard error; `RUST_LOG` chooses which.
+pub fn log_to_stderr() {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+}
+
+/// The runtime of a service.
+pub fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {
+    Ok(tokio::runtime::Builder::new_multi_thread().enable_all().build()?)
 }

@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 
 use super::archive::{Archive, CELL_TENTHS};
 use super::settings::WindowPolicy;
-use crate::math::robust::{TrimmedMean, merge, trimmed_mean};
+use crate::math::robust::{TrimmedMean, merge, sort_counts, trimmed_mean};
 use crate::telemetry::{AccRecord, Mode, Quality, Range, SAMPLES_PER_RECORD};
 use crate::units::Clock;
 
@@ -44,7 +44,8 @@ impl HalfWindow {
         for record in records {
             half.add(record, &mut digest);
         }
-        half.sorted.as_flattened_mut().iter_mut().for_each(|counts| counts.sort_unstable());
+        let mut scratch = Vec::new();
+        half.sorted.as_flattened_mut().iter_mut().for_each(|counts| sort_counts(counts, &mut scratch));
         half.digest = digest.finalize().into();
         half
     }
@@ -55,31 +56,35 @@ impl HalfWindow {
         self.temperature.0 += f64::from(record.temperature_c);
         self.temperature.1 += 1;
         self.latest = self.latest.max(Some(record.clock));
-        digest.update(record.clock.tenths().to_le_bytes());
-        digest.update(record.temperature_c.to_le_bytes());
-        digest.update([record.mode.code(), u8::from(record.table_moving)]);
-        digest.update(record.ranges.map(|range| range.index() as u8));
-        let mut octets = [0u8; SAMPLES_PER_RECORD * 6];
-        for (octets, count) in octets.as_chunks_mut::<2>().0.iter_mut().zip(record.counts.as_flattened()) {
-            *octets = count.to_le_bytes();
-        }
-        digest.update(octets);
+        digest.update(digest_octets(record));
         if record.mode != Mode::Normal || record.table_moving {
             self.away += SAMPLES_PER_RECORD as u16;
             return;
         }
-        for sample in &record.counts {
-            let mut at_rail = false;
-            for ((count, by_range), range) in sample.iter().zip(&mut self.sorted).zip(record.ranges) {
-                if AccRecord::is_at_rail(*count) {
-                    at_rail = true;
-                } else {
-                    by_range[range.index()].push(*count);
-                }
+        let is_at_rail = |sample: &[i16; 3]| sample.iter().any(|count| AccRecord::is_at_rail(*count));
+        self.at_rail += record.counts.iter().filter(|sample| is_at_rail(sample)).count() as u16;
+        for (axis, by_range) in self.sorted.iter_mut().enumerate() {
+            let counts = &mut by_range[record.ranges[axis].index()];
+            if counts.capacity() == 0 {
+                counts.reserve_exact(CELL_TENTHS as usize);
             }
-            self.at_rail += u16::from(at_rail);
+            let axis_counts = record.counts.iter().map(|sample| sample[axis]);
+            counts.extend(axis_counts.filter(|count| !AccRecord::is_at_rail(*count)));
         }
     }
+}
+
+/// Everything of a record that a window is made from.
+fn digest_octets(record: &AccRecord) -> [u8; 17 + SAMPLES_PER_RECORD * 6] {
+    let mut octets = [0u8; 17 + SAMPLES_PER_RECORD * 6];
+    octets[..8].copy_from_slice(&record.clock.tenths().to_le_bytes());
+    octets[8..12].copy_from_slice(&record.temperature_c.to_le_bytes());
+    octets[12..14].copy_from_slice(&[record.mode.code(), u8::from(record.table_moving)]);
+    octets[14..17].copy_from_slice(&record.ranges.map(|range| range.index() as u8));
+    for (octets, count) in octets[17..].as_chunks_mut::<2>().0.iter_mut().zip(record.counts.as_flattened()) {
+        *octets = count.to_le_bytes();
+    }
+    octets
 }
 
 /// One axis of a window.
@@ -124,6 +129,7 @@ impl Window {
         let samples = total(|half| half.present);
         let known_since = halves[0].latest.max(halves[1].latest)?;
         let mut mixed = false;
+        let mut merged = Vec::with_capacity(WINDOW_SAMPLES);
         let axes = [0, 1, 2].map(|axis| {
             let points = [0, 1, 2].map(|range| halves.map(|half| half.sorted[axis][range].len()).iter().sum::<usize>());
             mixed |= points.iter().filter(|points| **points > 0).count() > 1;
@@ -132,7 +138,6 @@ impl Window {
             if points[range] < policy.samples_min {
                 return None;
             }
-            let mut merged = Vec::new();
             merge(&halves[0].sorted[axis][range], &halves[1].sorted[axis][range], &mut merged);
             let estimate = trimmed_mean(&merged, &policy.trim)?;
             Some(AxisWindow { range: Range::ALL[range], estimate })

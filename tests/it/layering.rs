@@ -1,0 +1,107 @@
+//! Keeps the rooms in order and the pure ones pure.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Rooms in their order, and whether they are pure. A room uses only itself and rooms before it.
+const ROOMS: [(&str, bool); 17] = [
+    ("units", true),
+    ("math", true),
+    ("telemetry", true),
+    ("ingest/wire", true),
+    ("physics", true),
+    ("pipeline", true),
+    ("simulate", true),
+    ("diagnose", true),
+    ("challenge", false),
+    ("config", false),
+    ("hub", false),
+    ("ingest", false),
+    ("record", false),
+    ("api", false),
+    ("service", false),
+    ("command", false),
+    ("main", false),
+];
+
+/// What no pure room may name.
+const IMPURE: [&str; 12] = [
+    "std::fs",
+    "std::net",
+    "std::thread",
+    "std::env",
+    "std::process",
+    "std::io::stdin",
+    "SystemTime",
+    "Instant::now",
+    "Timestamp::now",
+    "tokio",
+    "rayon",
+    "println!",
+];
+
+fn room_of(path: &str) -> usize {
+    let path = path.trim_end_matches(".rs").replace("::", "/");
+    // The longest name that fits: `ingest/wire` before `ingest`.
+    ROOMS
+        .iter()
+        .enumerate()
+        .filter(|(_, (room, _))| path == *room || path.starts_with(&format!("{room}/")))
+        .max_by_key(|(_, (room, _))| room.len())
+        .map(|(place, _)| place)
+        .unwrap_or_else(|| panic!("{path} is in no room"))
+}
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
+        if entry.path().is_dir() {
+            sources(&entry.path(), found);
+        } else if entry.path().extension().is_some_and(|extension| extension == "rs") {
+            found.push(entry.path());
+        }
+    }
+}
+
+/// Non-test lines without comments.
+fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let end = text.find("#[cfg(test)]").unwrap_or(text.len());
+    text[..end].lines().enumerate().map(|(n, line)| (n + 1, line.split("//").next().unwrap_or("")))
+}
+
+/// The crate paths a line names: `pipeline::product` of `crate::pipeline::product::Product`.
+fn crate_paths(line: &str) -> Vec<&str> {
+    line.match_indices("crate::")
+        .map(|(at, name)| &line[at + name.len()..])
+        .map(|rest| rest.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':')).next().unwrap_or(""))
+        .filter(|path| !path.is_empty())
+        .collect()
+}
+
+#[test]
+fn rooms_use_only_rooms_before_them_and_pure_rooms_touch_nothing_outside() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    sources(&root, &mut files);
+    assert!(files.len() > 20, "the sources were not found");
+    let mut faults = Vec::new();
+    for file in files {
+        let name = file.strip_prefix(&root).unwrap().to_string_lossy().replace('\\', "/");
+        if name == "lib.rs" || name == "ingest/mod.rs" {
+            continue;
+        }
+        let room = room_of(&name);
+        let text = fs::read_to_string(&file).unwrap();
+        for (number, line) in code(&text) {
+            for path in crate_paths(line) {
+                if room_of(path) > room {
+                    faults.push(format!("{name}:{number} uses {path}"));
+                }
+            }
+            let impure = IMPURE.iter().find(|word| ROOMS[room].1 && line.contains(*word));
+            if let Some(word) = impure {
+                faults.push(format!("{name}:{number} is pure and names {word}"));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
