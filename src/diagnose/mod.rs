@@ -24,3 +24,4 @@ pub mod solve;
 pub mod verdict;
 
 pub use analysis::{Analysis, Settings, analyse, diagnose};
+pub use answer::Diagnosis;
