@@ -1,14 +1,14 @@
 //! The commands of `oare`, one a file: arguments in, exit code out. The work is in the library.
 
 pub mod challenge;
-pub mod export;
-
-use std::process::ExitCode;
-
 pub mod diagnose;
+pub mod export;
 pub mod process;
 pub mod replay;
 pub mod serve;
+pub mod simulate;
+
+use std::process::ExitCode;
 
 /// Done.
 pub const DONE: ExitCode = ExitCode::SUCCESS;

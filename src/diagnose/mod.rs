@@ -12,14 +12,18 @@ pub mod design;
 pub mod error;
 pub mod locate;
 pub mod measure;
+pub mod measured;
 pub mod model;
 pub mod noise;
 pub mod null_table;
 pub mod open_form;
 mod optimise;
+pub mod orbit;
+pub mod poses;
 pub mod report;
 pub mod scene;
 pub mod search;
+pub mod series;
 pub mod solve;
 pub mod verdict;
 

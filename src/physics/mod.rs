@@ -14,14 +14,18 @@ pub mod attitude;
 pub mod bulge;
 pub mod density;
 pub mod drag;
+pub mod earth_orientation;
 pub mod geodetic;
+pub mod gravity_field;
 pub mod gravity_gradient;
+pub mod integrator;
 pub mod magnetic;
 pub mod orbit;
 pub mod rotation;
 pub mod shadow;
 pub mod solar_radiation;
 pub mod sun;
+pub mod third_body;
 pub mod time;
 pub mod vehicle;
 

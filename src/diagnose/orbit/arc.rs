@@ -1,0 +1,323 @@
+//! One satellite's arc: positions by integration, their partial derivatives by variational equations, and the fit of
+//! the initial state with any terms' coefficients by Gauss-Newton.
+//!
+//! A step never straddles an edge of the shadow. Not here: which terms to fit (see `search`).
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::OrbitError;
+use super::forces::{Baseline, Environment, Moment, Term, sunlit};
+use super::sp3::Track;
+use crate::physics::earth_orientation::lagrange_weights;
+use crate::physics::integrator::{Collocation, State, Step};
+
+/// Six nodes: order 12.
+const STAGES: usize = 6;
+/// Steps are no longer than this part of a revolution.
+const STEPS_PER_REVOLUTION: f64 = 40.0;
+/// Looked at for shadow inside a step, at this many points: a crossing of the penumbra alone is longer.
+const SHADOW_LOOKS: usize = 24;
+/// A shadow's edge is placed to this, s: at 1e-7 m/s^2 that is 1e-9 m/s.
+const EDGE_S: f64 = 0.01;
+const ITERATIONS_MAX: usize = 12;
+/// Positions that change by less than this between iterations have converged, m.
+const CONVERGED_M: f64 = 1e-4;
+
+/// Observed positions of one satellite in the inertial frame.
+#[derive(Debug, Clone)]
+pub struct Arc {
+    /// Such as `G05`.
+    pub id: String,
+    /// Seconds after the recording's origin.
+    pub t_s: Vec<f64>,
+    /// Inertial positions, m.
+    pub observed_m: Vec<Vector3<f64>>,
+    /// How many of them, from the first, are fitted; the rest are predicted.
+    pub fitted: usize,
+    /// Epochs not usable.
+    pub masked: usize,
+    start: State,
+    step_s: f64,
+}
+
+/// What a fit leaves.
+#[derive(Debug, Clone)]
+pub struct ArcFit {
+    /// State at the first epoch.
+    pub start: State,
+    /// The terms fitted, in order, with their coefficients.
+    pub coefficients: Vec<(Term, [f64; 2])>,
+    /// Observed minus computed, m, every epoch.
+    pub residuals_m: Vec<Vector3<f64>>,
+    /// Partials of every position (rows 3i..3i+3): six for the state, then those of `columns`.
+    pub partials: DMatrix<f64>,
+    /// The term each further column belongs to, scaled by [`Term::scale`].
+    pub columns: Vec<(Term, usize)>,
+}
+
+impl Arc {
+    /// From an Earth-fixed track; the first `fit_s` seconds of the recording are for the fit.
+    pub fn new(track: &Track, environment: &Environment, fit_s: f64) -> Result<Self, OrbitError> {
+        let inertial = |(t, r): (&f64, &Vector3<f64>)| environment.rotation.to_inertial(*t, r);
+        let observed_m: Vec<_> = track.t_s.iter().zip(&track.fixed_m).map(inertial).collect();
+        let fitted = track.t_s.partition_point(|t| *t <= fit_s);
+        if fitted < 12 {
+            return Err(OrbitError::TooFew { id: track.id.clone(), found: fitted, expected: 12 });
+        }
+        let start = first_state(&track.t_s, &observed_m, environment.field.gm_m3_s2());
+        let rate = (environment.field.gm_m3_s2() / start.r.norm().powi(3)).sqrt();
+        let step_s = std::f64::consts::TAU / rate / STEPS_PER_REVOLUTION;
+        let (id, masked) = (track.id.clone(), track.masked);
+        Ok(Self { id, t_s: track.t_s.clone(), observed_m, fitted, masked, start, step_s })
+    }
+
+    /// Lowest height over the equatorial radius, m.
+    pub fn height_min_m(&self) -> f64 {
+        let lowest = self.observed_m.iter().map(|r| r.norm()).fold(f64::INFINITY, f64::min);
+        lowest - crate::physics::third_body::EARTH_RADIUS_M
+    }
+
+    /// Fit the state and the coefficients of `active`, and give partials for `active` and `candidates`.
+    /// `from` starts the iteration (an earlier fit of the same arc).
+    pub fn fit(
+        &self,
+        environment: &Environment,
+        baseline: &Baseline,
+        active: &[Term],
+        candidates: &[Term],
+        from: Option<&ArcFit>,
+    ) -> ArcFit {
+        let mut fit = self.first_guess(active, &[], from);
+        for _ in 0..ITERATIONS_MAX {
+            self.propagate(environment, baseline, &mut fit);
+            let unknowns = 6 + active.iter().map(|term| term.parameters().len()).sum::<usize>();
+            let rows = 3 * self.fitted;
+            let design = fit.partials.view((0, 0), (rows, unknowns)).into_owned();
+            let residuals =
+                DVector::from_iterator(rows, fit.residuals_m[..self.fitted].iter().flat_map(|r| [r.x, r.y, r.z]));
+            let Some(step) = solve(&design, &residuals) else { break };
+            let moved_m = (&design * &step).amax();
+            self.apply(&mut fit, &step);
+            if moved_m < CONVERGED_M {
+                break;
+            }
+        }
+        // The candidates' columns are wanted once only, along the orbit that was found.
+        fit.columns = self.first_guess(active, candidates, None).columns;
+        self.propagate(environment, baseline, &mut fit);
+        fit
+    }
+
+    fn first_guess(&self, active: &[Term], candidates: &[Term], from: Option<&ArcFit>) -> ArcFit {
+        let earlier = |term: &Term| {
+            let found = from.and_then(|fit| fit.coefficients.iter().find(|(t, _)| t == term));
+            (*term, found.map_or([0.0; 2], |(_, value)| *value))
+        };
+        let of = |term: &Term| (0..term.parameters().len()).map(|k| (*term, k)).collect::<Vec<_>>();
+        let others = candidates.iter().filter(|term| !active.contains(term));
+        ArcFit {
+            start: from.map_or(self.start, |fit| fit.start),
+            coefficients: active.iter().map(earlier).collect(),
+            residuals_m: Vec::new(),
+            partials: DMatrix::zeros(0, 0),
+            columns: active.iter().chain(others).flat_map(of).collect(),
+        }
+    }
+
+    fn apply(&self, fit: &mut ArcFit, step: &DVector<f64>) {
+        fit.start.r += Vector3::new(step[0], step[1], step[2]);
+        fit.start.v += Vector3::new(step[3], step[4], step[5]);
+        let mut next = 6;
+        for (term, value) in &mut fit.coefficients {
+            for v in value.iter_mut().take(term.parameters().len()) {
+                *v += step[next] * term.scale();
+                next += 1;
+            }
+        }
+    }
+
+    /// Integrate over all epochs, filling residuals and partials.
+    fn propagate(&self, environment: &Environment, baseline: &Baseline, fit: &mut ArcFit) {
+        let flight = Flight { environment, baseline, gauss: Collocation::gauss(STAGES) };
+        let columns = 6 + fit.columns.len();
+        let zero = State { r: Vector3::zeros(), v: Vector3::zeros() };
+        let mut carried = vec![zero; columns];
+        for axis in 0..3 {
+            carried[axis].r[axis] = 1.0;
+            carried[axis + 3].v[axis] = 1.0;
+        }
+        fit.partials = DMatrix::zeros(3 * self.t_s.len(), columns);
+        fit.residuals_m = Vec::with_capacity(self.t_s.len());
+        let (mut state, mut t) = (fit.start, self.t_s[0]);
+        for (i, &epoch) in self.t_s.iter().enumerate() {
+            let parts = ((epoch - t) / self.step_s).ceil().max(1.0);
+            let h = (epoch - t) / parts;
+            for part in 0..parts as usize {
+                if h > 0.0 {
+                    state = flight.advance(t + part as f64 * h, state, h, fit, &mut carried);
+                }
+            }
+            t = epoch;
+            fit.residuals_m.push(self.observed_m[i] - state.r);
+            for (k, column) in carried.iter().enumerate() {
+                fit.partials.fixed_view_mut::<3, 1>(3 * i, k).copy_from(&column.r);
+            }
+        }
+    }
+}
+
+impl ArcFit {
+    /// Rms of the 3-D residual over a range of epochs, m.
+    pub fn rms_m(&self, epochs: std::ops::Range<usize>) -> f64 {
+        let n = epochs.len().max(1) as f64;
+        (self.residuals_m[epochs].iter().map(|r| r.norm_squared()).sum::<f64>() / n).sqrt()
+    }
+
+    /// Coefficients of a fitted term.
+    pub fn coefficient(&self, term: Term) -> Option<[f64; 2]> {
+        self.coefficients.iter().find(|(t, _)| *t == term).map(|(_, value)| *value)
+    }
+}
+
+/// Least squares by Cholesky on normalised columns; none if the columns are dependent.
+pub(super) fn solve(design: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
+    let norms: Vec<f64> = design.column_iter().map(|c| c.norm().max(1e-300)).collect();
+    let mut scaled = design.clone();
+    for (mut column, norm) in scaled.column_iter_mut().zip(&norms) {
+        column /= *norm;
+    }
+    let qr = scaled.qr();
+    let step = qr.r().solve_upper_triangular(&qr.q().tr_mul(y))?;
+    Some(DVector::from_iterator(norms.len(), step.iter().zip(&norms).map(|(s, n)| s / n)))
+}
+
+struct Flight<'a> {
+    environment: &'a Environment,
+    baseline: &'a Baseline,
+    gauss: Collocation,
+}
+
+impl Flight<'_> {
+    fn acceleration(&self, t_s: f64, state: &State, coefficients: &[(Term, [f64; 2])]) -> Vector3<f64> {
+        let moment = Moment::new(self.environment, t_s, state);
+        let mut sum = moment.baseline(self.environment, self.baseline);
+        for (term, value) in coefficients {
+            let [a, b] = moment.columns(self.environment, *term);
+            sum += a * value[0] + b * value[1];
+        }
+        sum
+    }
+
+    fn step(&self, t_s: f64, state: State, h_s: f64, coefficients: &[(Term, [f64; 2])]) -> Step {
+        self.gauss.step(t_s, state, h_s, &mut |t, s| self.acceleration(t, s, coefficients))
+    }
+
+    /// Advance by `h_s`, splitting at the edges of the shadow.
+    fn advance(&self, t_s: f64, state: State, h_s: f64, fit: &ArcFit, carried: &mut [State]) -> State {
+        let whole = self.step(t_s, state, h_s, &fit.coefficients);
+        let edges = self.shadow_edges(&whole);
+        if edges.is_empty() {
+            self.carry(&whole, fit, carried);
+            return whole.end;
+        }
+        let mut now = state;
+        let mut from = 0.0;
+        for to in edges.into_iter().chain([h_s]) {
+            let step = self.step(t_s + from, now, to - from, &fit.coefficients);
+            self.carry(&step, fit, carried);
+            (now, from) = (step.end, to);
+        }
+        now
+    }
+
+    fn gradients(&self, step: &Step) -> Vec<nalgebra::Matrix3<f64>> {
+        let pole = Moment::new(self.environment, step.t_s, &step.start).pole();
+        step.inner.iter().map(|state| self.environment.field.gradient(&state.r, &pole)).collect()
+    }
+
+    fn carry(&self, step: &Step, fit: &ArcFit, carried: &mut [State]) {
+        let gradient = self.gradients(step);
+        let moments: Vec<Moment> = self
+            .gauss
+            .nodes()
+            .iter()
+            .zip(&step.inner)
+            .map(|(c, state)| Moment::new(self.environment, step.t_s + c * step.h_s, state))
+            .collect();
+        let quiet = [Vector3::zeros(); STAGES];
+        for (k, column) in carried.iter_mut().enumerate() {
+            let forcing: Vec<Vector3<f64>> = match k.checked_sub(6) {
+                None => quiet.to_vec(),
+                Some(j) => {
+                    let (term, part) = fit.columns[j];
+                    moments.iter().map(|m| m.columns(self.environment, term)[part] * term.scale()).collect()
+                }
+            };
+            *column = self.gauss.step_linear(step.h_s, *column, &gradient, &forcing);
+        }
+    }
+
+    /// Instants inside a step at which full light or full shadow begins or ends, s after its start.
+    fn shadow_edges(&self, step: &Step) -> Vec<f64> {
+        let light = |s: f64| {
+            let r = self.gauss.position_in(step, s / step.h_s);
+            sunlit(&r, &self.environment.bodies.at(step.t_s + s))
+        };
+        let grade = |light: f64| if light >= 1.0 { 2 } else { i32::from(light > 0.0) };
+        let mut edges = Vec::new();
+        let mut looked = 0.0;
+        let mut last = grade(light(0.0));
+        for i in 1..=SHADOW_LOOKS {
+            let s = step.h_s * i as f64 / SHADOW_LOOKS as f64;
+            let now = grade(light(s));
+            if now != last {
+                locate_edges(&light, &grade, (looked, last), (s, now), &mut edges);
+            }
+            (looked, last) = (s, now);
+        }
+        edges.retain(|s| *s > 10.0 * EDGE_S && *s < step.h_s - 10.0 * EDGE_S);
+        edges
+    }
+}
+
+/// Bisect between two instants of different grade; a jump over a grade holds two edges.
+fn locate_edges(
+    light: &dyn Fn(f64) -> f64,
+    grade: &dyn Fn(f64) -> i32,
+    from: (f64, i32),
+    to: (f64, i32),
+    edges: &mut Vec<f64>,
+) {
+    if to.0 - from.0 < EDGE_S {
+        edges.push(0.5 * (from.0 + to.0));
+        return;
+    }
+    let middle = (0.5 * (from.0 + to.0), grade(light(0.5 * (from.0 + to.0))));
+    if middle.1 != from.1 {
+        locate_edges(light, grade, from, middle, edges);
+    }
+    if middle.1 != to.1 {
+        locate_edges(light, grade, middle, to, edges);
+    }
+}
+
+/// A first state from the positions alone: the polynomial through the first points, its slope as the velocity; where
+/// the first points are too far apart, the velocity that two-body motion needs to reach the second.
+fn first_state(t_s: &[f64], r_m: &[Vector3<f64>], gm: f64) -> State {
+    let mut n = 1;
+    let spacing = t_s[1] - t_s[0];
+    while n < 9.min(t_s.len() - 1) && (t_s[n] - t_s[n - 1] - spacing).abs() < 1.0 {
+        n += 1;
+    }
+    let nodes: Vec<f64> = t_s[..n].iter().map(|t| t - t_s[0]).collect();
+    let delta = spacing * 1e-3;
+    let (ahead, behind) = (lagrange_weights(&nodes, delta), lagrange_weights(&nodes, -delta));
+    let slope: Vector3<f64> = (0..n).map(|i| r_m[i] * ((ahead[i] - behind[i]) / (2.0 * delta))).sum();
+    let first = r_m[0];
+    if n >= 7 {
+        return State { r: first, v: slope };
+    }
+    let rate = (gm / first.norm().powi(3)).sqrt();
+    let (sin, cos) = (rate * spacing).sin_cos();
+    State { r: first, v: (r_m[1] - first * cos) * (rate / sin) }
+}

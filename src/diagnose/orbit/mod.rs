@@ -1,0 +1,141 @@
+//! Precise orbits against a list of forces: what is missing from the list, per satellite and for all.
+
+pub mod arc;
+pub mod forces;
+pub mod report;
+pub mod search;
+pub mod sp3;
+
+use std::collections::BTreeMap;
+
+use thiserror::Error;
+
+use self::arc::Arc;
+use self::forces::{Baseline, Environment, Term};
+use self::search::Problem;
+use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, lookup, texts};
+use crate::physics::earth_orientation::{EarthOrientation, EarthOrientationError};
+use crate::physics::gravity_field::{GravityField, GravityFieldError};
+
+const POSITION_SIGMA_M: f64 = 0.025;
+/// What the simulation may include, as the case format names it.
+pub const INCLUDES: &str =
+    "gravity:<degree>, sun, moon, solar_radiation_pressure, srp_y_bias, srp_b_bias, srp_once_per_rev";
+
+/// An orbit case that cannot be analysed.
+#[derive(Debug, Error)]
+pub enum OrbitError {
+    /// A line of an SP3 file.
+    #[error("{file}, line {line}: expected {expected}, found {found:?}")]
+    Sp3 {
+        /// File name.
+        file: String,
+        /// Line number, from 1.
+        line: usize,
+        /// What belongs there.
+        expected: &'static str,
+        /// What was there.
+        found: String,
+    },
+    /// Nothing to work on.
+    #[error("the recording does not hold {what}")]
+    Empty {
+        /// What was looked for.
+        what: String,
+    },
+    /// A satellite with too few positions.
+    #[error("{id} has {found} usable positions to fit, expected at least {expected}")]
+    TooFew {
+        /// Satellite.
+        id: String,
+        /// Positions found.
+        found: usize,
+        /// Positions needed.
+        expected: usize,
+    },
+    /// A word among `includes` that means nothing for an orbit.
+    #[error("simulation.includes: expected some of {INCLUDES}, found {found:?}")]
+    Includes {
+        /// The word.
+        found: String,
+    },
+    /// Earth orientation.
+    #[error(transparent)]
+    EarthOrientation(#[from] EarthOrientationError),
+    /// Gravity field.
+    #[error(transparent)]
+    Gravity(#[from] GravityFieldError),
+}
+
+/// Analyse an orbit case.
+pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Answer, MeasuredError> {
+    let problem = problem(case, files)?;
+    let search = problem.search(&mut |_| ());
+    Ok(report::answer(&case.id, &problem, &search))
+}
+
+/// The case's arcs and forces.
+pub fn problem(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Problem, MeasuredError> {
+    let names = texts(&case.table, "recording.files")
+        .or_else(|| Some(vec![case.text("recording.file").ok()?]))
+        .ok_or_else(|| case.wrong("recording.files", "a list of SP3 files"))?;
+    let sp3: Vec<(String, String)> = names.iter().map(|name| (name.clone(), files[name].clone())).collect();
+    let recording = sp3::Recording::read(&sp3)?;
+    let eop = EarthOrientation::from_csv(&files[&case.text("recording.eop")?]).map_err(OrbitError::from)?;
+    let middle_mjd = recording.origin.mjd + (recording.origin.s + 0.5 * recording.span_s()) / 86_400.0;
+    let gravity = &files[&case.text("recording.gravity")?];
+    let field = GravityField::from_gfc(gravity, middle_mjd).map_err(OrbitError::from)?;
+    let environment = Environment::new(recording.origin, recording.span_s(), &eop, field).map_err(OrbitError::from)?;
+    let fit_s = case.number("recording.fit_hours")?.map_or(f64::INFINITY, |h| h * 3600.0);
+    let sigma_m = case.number("recording.position_sigma_m")?.unwrap_or(POSITION_SIGMA_M);
+    if sigma_m <= 0.0 {
+        return Err(case.wrong("recording.position_sigma_m", "a number above zero"));
+    }
+    let wanted = wanted(case)?;
+    let mut arcs = Vec::new();
+    for track in &recording.tracks {
+        if wanted.as_ref().is_none_or(|ids| ids.contains(&track.id)) {
+            match Arc::new(track, &environment, fit_s) {
+                Ok(arc) => arcs.push(arc),
+                // Asked for by name, or the only one: say what is wrong. Among many, one too short is left out.
+                Err(error) if wanted.is_some() || recording.tracks.len() == 1 => return Err(error.into()),
+                Err(_) => {}
+            }
+        }
+    }
+    if arcs.is_empty() {
+        let what = wanted.map_or("a satellite".to_owned(), |ids| format!("any of the satellites {}", ids.join(", ")));
+        return Err(OrbitError::Empty { what }.into());
+    }
+    Ok(Problem { environment, baseline: baseline(case)?, arcs, sigma_m })
+}
+
+fn wanted(case: &MeasuredCase) -> Result<Option<Vec<String>>, MeasuredError> {
+    match lookup(&case.table, "recording.satellites") {
+        None => Ok(None),
+        Some(value) if value.as_str() == Some("all") => Ok(None),
+        Some(value) if value.as_str().is_some() => Ok(value.as_str().map(|id| vec![id.to_owned()])),
+        Some(_) => texts(&case.table, "recording.satellites")
+            .map(Some)
+            .ok_or_else(|| case.wrong("recording.satellites", "\"all\" or a list such as [\"G05\"]")),
+    }
+}
+
+/// The force model that the simulation claims.
+pub fn baseline(case: &MeasuredCase) -> Result<Baseline, MeasuredError> {
+    let mut baseline = Baseline { degree: 0, known: Vec::new(), estimated: Vec::new() };
+    for token in &case.includes {
+        match (token.as_str(), token.strip_prefix("gravity:").map(str::parse)) {
+            (_, Some(Ok(degree))) => baseline.degree = degree,
+            ("sun", _) => baseline.known.push(Term::Sun),
+            ("moon", _) => baseline.known.push(Term::Moon),
+            ("solar_radiation_pressure", _) => baseline.estimated.push(Term::SolarRadiation),
+            ("srp_y_bias", _) => baseline.estimated.push(Term::YBias),
+            ("srp_b_bias", _) => baseline.estimated.push(Term::BBias),
+            ("srp_once_per_rev", _) => baseline.estimated.push(Term::OncePerRev),
+            ("aerodynamic_drag", _) => baseline.estimated.push(Term::Drag),
+            _ => return Err(OrbitError::Includes { found: token.clone() }.into()),
+        }
+    }
+    Ok(baseline)
+}

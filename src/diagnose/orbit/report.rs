@@ -1,0 +1,278 @@
+//! The search's outcome in words and figures: a verdict for all arcs and one for each.
+
+use super::arc::{Arc, ArcFit};
+use super::forces::Term;
+use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m};
+use crate::diagnose::answer::{Alternative, Interval, Located, ParameterAnswer, Verdict};
+use crate::diagnose::measured::Answer;
+use crate::diagnose::measured::answer::{
+    ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, StepAnswer, parameter, posterior,
+};
+use crate::diagnose::measured::spread::{median, scatter};
+
+/// Every arc's estimates of every accepted term.
+pub type Table = Vec<(Term, f64, Vec<Vec<Estimate>>)>;
+
+/// Put a search into an answer.
+pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
+    let (first, last) = (&search.levels[0], &search.levels[search.levels.len() - 1]);
+    let table = table(problem, last);
+    let arcs: Vec<ArcAnswer> = (0..problem.arcs.len()).map(|i| arc_answer(problem, search, &table, i)).collect();
+    let unexplained = arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).count();
+    let verdict = match (table.is_empty(), 2 * unexplained > arcs.len()) {
+        (_, true) => Verdict::Unexplained,
+        (true, false) => Verdict::Consistent,
+        (false, false) => Verdict::Explained,
+    };
+    let effects = common_effects(problem, search, &table);
+    let strongest_refused = search.refused.first().map_or(0.0, |(_, score)| *score);
+    let weakest = table.iter().map(|(_, score, _)| *score).fold(f64::INFINITY, f64::min);
+    let false_alarm_probability = match verdict {
+        Verdict::Explained => (-0.5 * weakest).exp().clamp(1e-12, 1.0),
+        Verdict::Unexplained => (-0.5 * SCORE_MIN).exp(),
+        _ => (-0.5 * strongest_refused).exp().clamp(0.0, 1.0),
+    };
+    Answer {
+        schema: "oare.diagnosis/1".to_owned(),
+        case: case.to_owned(),
+        verdict,
+        false_alarm_probability,
+        located: located(problem, &arcs, table.is_empty()),
+        alternatives: alternatives(search, &table),
+        hypothesis: None,
+        unit: "m".to_owned(),
+        fit: fit(problem, first, last),
+        upper_limits: limits(problem, search, last),
+        separating_observation: None,
+        cannot_tell_apart: Vec::new(),
+        steps: steps(problem, search),
+        notes: notes(problem, &arcs),
+        effects,
+        arcs,
+    }
+}
+
+/// Estimates of every accepted term in every arc.
+pub fn table(problem: &Problem, last: &Level) -> Table {
+    let of = |term: Term| (0..problem.arcs.len()).map(|i| estimates(problem, last, i, term)).collect();
+    last.accepted.iter().map(|(term, score)| (*term, *score, of(*term))).collect()
+}
+
+fn steps(problem: &Problem, search: &Search) -> Vec<StepAnswer> {
+    let one = |level: &Level| StepAnswer {
+        added: level.accepted.last().map(|(term, _)| term.id().to_owned()),
+        rms: problem.median_rms_m(level),
+        predicted_rms: problem.median_predicted_m(level),
+        score: level.accepted.last().map(|(_, score)| *score),
+    };
+    search.levels.iter().map(one).collect()
+}
+
+fn effect(term: Term, score: f64, parameters: Vec<ParameterAnswer>, why: String, rms: Vec<f64>) -> Effect {
+    let from_degree = match term {
+        Term::DegreesFrom(from) => Some(from),
+        _ => None,
+    };
+    let (id, name) = (term.id().to_owned(), term.name().to_owned());
+    Effect { id, name, posterior: posterior(score), parameters, axis: None, from_degree, why, rms }
+}
+
+fn with_degree(term: Term, mut parameters: Vec<ParameterAnswer>) -> Vec<ParameterAnswer> {
+    if let Term::DegreesFrom(from) = term {
+        parameters.push(parameter("from_degree", from as f64, 0.0, "1"));
+    }
+    parameters
+}
+
+fn common_effects(problem: &Problem, search: &Search, table: &Table) -> Vec<Effect> {
+    let one = |(step, (term, score, rows)): (usize, &(Term, f64, Vec<Vec<Estimate>>))| {
+        let (before, after) = (&search.levels[step], &search.levels[step + 1]);
+        let names = term.parameters();
+        let parameters = (0..names.len()).map(|k| common(*term, names[k], rows, k)).collect();
+        let (was, is) = (problem.median_rms_m(before), problem.median_rms_m(after));
+        let n = problem.arcs.len();
+        let wanted = (0..n).filter(|i| evidence(&problem.arcs[*i], &before.fits[*i], *term) > 0.0).count();
+        let mut why = format!(
+            "With it the 3-D residual of the fit falls from {was:.3} m to {is:.3} m (median of {n}); {wanted} of {n} arcs ask for it."
+        );
+        if n > 1 && !term.is_known_size() {
+            why.push_str(" One value per satellite, in `arcs`; the figure here is their median.");
+        }
+        effect(*term, *score, with_degree(*term, parameters), why, axis_rms(problem, after))
+    };
+    table.iter().enumerate().map(one).collect()
+}
+
+/// One value for all arcs: the weighted mean of a term of known size, the median of a satellite's own.
+fn common(term: Term, name: &str, rows: &[Vec<Estimate>], k: usize) -> ParameterAnswer {
+    let each: Vec<Estimate> = rows.iter().filter_map(|row| row.get(k).copied()).collect();
+    let values: Vec<f64> = each.iter().map(|e| e.value).collect();
+    let count = (each.len() as f64).max(1.0);
+    if each.len() == 1 {
+        return parameter(name, each[0].value, each[0].sigma, term.unit());
+    }
+    if term.is_known_size() {
+        let weight: f64 = each.iter().map(|e| e.sigma.powi(-2)).sum();
+        let mean = each.iter().map(|e| e.value * e.sigma.powi(-2)).sum::<f64>() / weight;
+        // Satellites disagree by more than their own errors say; their scatter is then the error.
+        let chi2 = each.iter().map(|e| ((e.value - mean) / e.sigma).powi(2)).sum::<f64>() / (count - 1.0);
+        return parameter(name, mean, (chi2.max(1.0) / weight).sqrt(), term.unit());
+    }
+    let own = median(each.iter().map(|e| e.sigma));
+    let sigma = 1.2533 * scatter(&values).max(own) / count.sqrt();
+    parameter(name, median(values), sigma, term.unit())
+}
+
+fn arc_answer(problem: &Problem, search: &Search, table: &Table, i: usize) -> ArcAnswer {
+    let (first, last) = (&search.levels[0], &search.levels[search.levels.len() - 1]);
+    let (arc, fit) = (&problem.arcs[i], &last.fits[i]);
+    let rms_after = fit.rms_m(0..arc.fitted);
+    let mut effects: Vec<Effect> = Vec::new();
+    for (step, (term, _, rows)) in table.iter().enumerate() {
+        let names = term.parameters();
+        let parameters = rows[i].iter().zip(names).map(|(e, name)| parameter(name, e.value, e.sigma, term.unit()));
+        let parameters = with_degree(*term, parameters.collect());
+        let (before, after) = (&search.levels[step].fits[i], &search.levels[step + 1].fits[i]);
+        let (was, is) = (before.rms_m(0..arc.fitted), after.rms_m(0..arc.fitted));
+        let why = format!("3-D residual of this arc from {was:.3} m to {is:.3} m.");
+        effects.push(effect(*term, evidence(arc, before, *term), parameters, why, vec![is]));
+    }
+    let left = rms_after > problem.rms_max_m();
+    let (verdict, effects, fitted_beside, note) = if left {
+        let note = format!(
+            "{rms_after:.3} m remain where {:.3} m is the most that the stated accuracy allows; nothing in the catalogue removes it.",
+            problem.rms_max_m()
+        );
+        (Verdict::Unexplained, Vec::new(), effects, Some(note))
+    } else if effects.is_empty() {
+        (Verdict::Consistent, effects, Vec::new(), None)
+    } else {
+        (Verdict::Explained, effects, Vec::new(), None)
+    };
+    ArcAnswer {
+        id: arc.id.clone(),
+        verdict,
+        effects,
+        fitted_beside,
+        rms_before: first.fits[i].rms_m(0..arc.fitted),
+        rms_after,
+        predicted_rms: predicted_m(arc, fit),
+        fitted: arc.fitted,
+        masked: arc.masked,
+        note,
+    }
+}
+
+/// Median over arcs of the rms along radius, track and normal, m.
+fn axis_rms(problem: &Problem, level: &Level) -> Vec<f64> {
+    let one = |(arc, fit): (&Arc, &ArcFit)| rtn_rms(arc, fit);
+    let each: Vec<[f64; 3]> = problem.arcs.iter().zip(&level.fits).map(one).collect();
+    (0..3).map(|k| median(each.iter().map(|rms| rms[k]))).collect()
+}
+
+fn rtn_rms(arc: &Arc, fit: &ArcFit) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for i in 0..arc.fitted {
+        let next = if i + 1 < arc.t_s.len() { i + 1 } else { i - 1 };
+        let radial = arc.observed_m[i].normalize();
+        let ahead = (arc.observed_m[next] - arc.observed_m[i]) * if next > i { 1.0 } else { -1.0 };
+        let normal = radial.cross(&ahead).normalize();
+        let r = &fit.residuals_m[i];
+        for (sum, axis) in sum.iter_mut().zip([radial, normal.cross(&radial), normal]) {
+            *sum += r.dot(&axis).powi(2);
+        }
+    }
+    sum.map(|s| (s / arc.fitted as f64).sqrt())
+}
+
+fn fit(problem: &Problem, first: &Level, last: &Level) -> Fit {
+    let level = |level: &Level| {
+        let rms_total = problem.median_rms_m(level);
+        let whitened_chi2_per_dof = rms_total * rms_total / (3.0 * problem.sigma_m * problem.sigma_m);
+        FitLevel { rms: axis_rms(problem, level), rms_total, whitened_chi2_per_dof }
+    };
+    let held_out = match (problem.median_predicted_m(first), problem.median_predicted_m(last)) {
+        (Some(before), Some(after)) => {
+            let floor = 3.0 * problem.sigma_m * problem.sigma_m;
+            let excess = (before * before - floor).max(1e-12);
+            Some(HeldOut {
+                scheme: "what follows fit_hours, predicted; median of the arcs, 3-D".to_owned(),
+                before_rms: vec![before],
+                after_rms: vec![after],
+                excess_removed: ((before * before - after * after) / excess).clamp(-1.0, 1.0),
+            })
+        }
+        _ => None,
+    };
+    Fit { noise_floor: vec![problem.sigma_m; 3], before: level(first), after: level(last), held_out }
+}
+
+fn limits(problem: &Problem, search: &Search, last: &Level) -> Vec<Limit> {
+    let one = |(term, _): &(Term, f64)| {
+        let each = (0..problem.arcs.len()).filter_map(|i| {
+            let estimate = *estimates(problem, last, i, *term).first()?;
+            if term.is_known_size() {
+                // The term's size is known: the limit is what it would do to the orbit.
+                let fit = &last.fits[i];
+                let column = fit.columns.iter().position(|(t, _)| t == term)?;
+                let n = 3 * problem.arcs[i].fitted;
+                return Some(
+                    fit.partials.view((0, 6 + column), (n, 1)).norm() / (problem.arcs[i].fitted as f64).sqrt(),
+                );
+            }
+            Some(estimate.value.abs() + 2.0 * estimate.sigma)
+        });
+        let unit = if term.is_known_size() { "m" } else { term.unit() };
+        Limit { id: term.id().to_owned(), limit: median(each), unit: unit.to_owned() }
+    };
+    search.refused.iter().map(one).collect()
+}
+
+fn alternatives(search: &Search, table: &Table) -> Vec<Alternative> {
+    let Some((named, best, _)) = table.first() else { return Vec::new() };
+    let others = search.first_scores.iter().filter(|(term, score)| term != named && *score > 0.0);
+    let one = |(term, score): &(Term, f64)| Alternative {
+        effects: vec![term.id().to_owned()],
+        posterior: posterior(score - best),
+        delta_bic: best - score,
+    };
+    others.take(3).map(one).collect()
+}
+
+fn located(problem: &Problem, arcs: &[ArcAnswer], nothing: bool) -> Located {
+    let odd: Vec<&ArcAnswer> = arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).collect();
+    if nothing && odd.is_empty() {
+        return Located::default();
+    }
+    let interval = |arc: &&ArcAnswer| {
+        let own = problem.arcs.iter().find(|a| a.id == arc.id)?;
+        let (start_s, end_s) = (own.t_s[0], own.t_s[own.fitted - 1]);
+        Some(Interval { start_s, end_s, why: format!("{}: {:.3} m unexplained", arc.id, arc.rms_after) })
+    };
+    let axes = ["radial", "along", "cross"].map(str::to_owned).to_vec();
+    Located {
+        axes,
+        frame: "lvlh".to_owned(),
+        intervals: odd.iter().filter_map(interval).collect(),
+        ..Located::default()
+    }
+}
+
+fn notes(problem: &Problem, arcs: &[ArcAnswer]) -> Vec<String> {
+    let mut notes = vec![
+        "The initial state of every arc, and the coefficients of radiation terms that the simulation includes, are estimated with it."
+            .to_owned(),
+        "The pull of Sun and Moon includes the tide they raise in the solid Earth; the Earth's relativistic term is always in."
+            .to_owned(),
+    ];
+    let masked: usize = problem.arcs.iter().map(|arc| arc.masked).sum();
+    if masked > 0 {
+        notes.push(format!("{masked} epochs were missing or unusable and are left out."));
+    }
+    let odd: Vec<&str> =
+        arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).map(|arc| arc.id.as_str()).collect();
+    if !odd.is_empty() {
+        notes.push(format!("Unexplained, and given no cause: {}.", odd.join(", ")));
+    }
+    notes
+}

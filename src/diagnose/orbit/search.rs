@@ -1,0 +1,299 @@
+//! Which terms the arcs ask for: a forward search over the catalogue on the evidence of all arcs together, refitted in
+//! full after every step, then a look back that drops what the rest has made needless.
+//!
+//! The evidence of a term in one arc is `n ln(RSS0/RSS1) - k ln n`, with `n` the number of *independent* residuals under
+//! the richer model: residuals of an orbit are smooth for hours, and counting every epoch would find a term in anything.
+//! Not here: words and figures for the reader (see `report`).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::arc::{Arc, ArcFit};
+use super::forces::{Baseline, Environment, Term};
+use crate::diagnose::measured::spread::{median, memory};
+
+/// Evidence that all arcs together must give for a term: odds of one in 8,000 for chance at twice the log.
+pub const SCORE_MIN: f64 = 18.0;
+/// One arc counts for no more than this, so that a single odd satellite cannot name a common cause.
+const SCORE_ARC_MAX: f64 = 100.0;
+/// Unlisted accelerations (radiation from the Earth, antennas, attitude: 1e-10 m/s^2) leave up to this many times the stated
+/// accuracy in an arc of two days, which is no finding; beyond it something is there.
+const EXCESS_MAX: f64 = 4.0;
+/// Where there is no air, drag is no candidate, m.
+const AIR_TOP_M: f64 = 1.5e6;
+const STEPS_MAX: usize = 10;
+
+/// What is to be explained.
+pub struct Problem {
+    /// Where they fly.
+    pub environment: Environment,
+    /// What the simulation includes.
+    pub baseline: Baseline,
+    /// The arcs.
+    pub arcs: Vec<Arc>,
+    /// Accuracy of a coordinate, m.
+    pub sigma_m: f64,
+}
+
+/// A model and its fits.
+#[derive(Clone)]
+pub struct Level {
+    /// Baseline with the accepted terms of known size in it.
+    pub baseline: Baseline,
+    /// Terms added so far, with the evidence for each.
+    pub accepted: Vec<(Term, f64)>,
+    /// One fit an arc.
+    pub fits: Vec<ArcFit>,
+}
+
+/// An estimate of one coefficient in one arc.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Value.
+    pub value: f64,
+    /// Standard error, the residuals' memory included.
+    pub sigma: f64,
+}
+
+/// The whole search: every level from the simulation as it stands to the last.
+pub struct Search {
+    /// Levels in order.
+    pub levels: Vec<Level>,
+    /// At the first step, the evidence for every candidate.
+    pub first_scores: Vec<(Term, f64)>,
+    /// Candidates not accepted at the end, with their evidence.
+    pub refused: Vec<(Term, f64)>,
+}
+
+impl Problem {
+    /// Candidates that the baseline does not hold.
+    fn candidates(&self, baseline: &Baseline) -> Vec<Term> {
+        let mut terms = vec![Term::Sun, Term::Moon];
+        if baseline.degree < self.environment.field.degree() {
+            terms.push(Term::DegreesFrom(baseline.degree.max(1) + 1));
+        }
+        terms.extend([Term::SolarRadiation, Term::YBias, Term::BBias, Term::OncePerRev]);
+        if self.arcs.iter().any(|arc| arc.height_min_m() < AIR_TOP_M) {
+            terms.push(Term::Drag);
+        }
+        terms.retain(|term| !baseline.known.contains(term) && !baseline.estimated.contains(term));
+        terms
+    }
+
+    /// Fit every arc to a model.
+    pub fn fit(&self, baseline: &Baseline, accepted: Vec<(Term, f64)>, from: Option<&[ArcFit]>) -> Level {
+        let candidates = self.candidates(baseline);
+        let active = &baseline.estimated;
+        let one = |(i, arc): (usize, &Arc)| {
+            arc.fit(&self.environment, baseline, active, &candidates, from.map(|fits| &fits[i]))
+        };
+        Level { baseline: baseline.clone(), accepted, fits: self.arcs.iter().enumerate().map(one).collect() }
+    }
+
+    /// Search. `report` is called after every level, for progress.
+    pub fn search(&self, report: &mut dyn FnMut(usize)) -> Search {
+        let mut levels = vec![self.fit(&self.baseline, Vec::new(), None)];
+        let mut first_scores = Vec::new();
+        let mut refused = Vec::new();
+        for step in 0..STEPS_MAX {
+            report(step);
+            let level = &levels[levels.len() - 1];
+            let mut scores = self.scores(level);
+            scores.sort_by(|a, b| b.1.total_cmp(&a.1));
+            if step == 0 {
+                first_scores.clone_from(&scores);
+            }
+            match scores.first() {
+                Some(&(term, score)) if score > SCORE_MIN => {
+                    let mut accepted = level.accepted.clone();
+                    accepted.push((term, score));
+                    let next = self.fit(&with(&level.baseline, term), accepted, Some(&level.fits));
+                    levels.push(next);
+                }
+                _ => {
+                    refused = scores;
+                    break;
+                }
+            }
+        }
+        let levels = self.look_back(levels);
+        Search { levels, first_scores, refused }
+    }
+
+    /// Drop terms of the last level that it can do without; the way there is then walked again without them.
+    fn look_back(&self, levels: Vec<Level>) -> Vec<Level> {
+        let accepted = levels[levels.len() - 1].accepted.clone();
+        if accepted.len() < 2 {
+            return levels;
+        }
+        let last = &levels[levels.len() - 1];
+        let needless = |(term, _): &&(Term, f64)| !term.is_known_size() && self.loss_without(last, *term) < SCORE_MIN;
+        let dropped: Vec<Term> = accepted.iter().filter(needless).map(|(term, _)| *term).collect();
+        if dropped.is_empty() {
+            return levels;
+        }
+        let mut walked = vec![levels[0].clone()];
+        for (term, score) in accepted.iter().filter(|(term, _)| !dropped.contains(term)) {
+            let level = &walked[walked.len() - 1];
+            let mut accepted = level.accepted.clone();
+            accepted.push((*term, *score));
+            let next = self.fit(&with(&level.baseline, *term), accepted, Some(&level.fits));
+            walked.push(next);
+        }
+        walked
+    }
+
+    /// Evidence of every candidate at a level: the sum over arcs, and at least half of the arcs must want it.
+    pub fn scores(&self, level: &Level) -> Vec<(Term, f64)> {
+        let score = |term: Term| {
+            let each: Vec<f64> = self.arcs.iter().zip(&level.fits).map(|(arc, fit)| evidence(arc, fit, term)).collect();
+            let wanting = each.iter().filter(|s| **s > 0.0).count();
+            let sum: f64 = each.iter().map(|s| s.min(SCORE_ARC_MAX)).sum();
+            if 2 * wanting >= each.len() { sum } else { sum.min(0.0) }
+        };
+        self.candidates(&level.baseline).into_iter().map(|term| (term, score(term))).collect()
+    }
+
+    /// Evidence that would be lost without a term that is in the model (linear, from the last fits).
+    fn loss_without(&self, level: &Level, term: Term) -> f64 {
+        let one = |(arc, fit): (&Arc, &ArcFit)| evidence_for_active(arc, fit, term).min(SCORE_ARC_MAX);
+        self.arcs.iter().zip(&level.fits).map(one).sum()
+    }
+
+    /// Rms beyond which an arc is called unexplained, m.
+    pub fn rms_max_m(&self) -> f64 {
+        EXCESS_MAX * 3f64.sqrt() * self.sigma_m
+    }
+
+    /// Median over the arcs of the rms that the fit leaves, m.
+    pub fn median_rms_m(&self, level: &Level) -> f64 {
+        median(self.arcs.iter().zip(&level.fits).map(|(arc, fit)| fit.rms_m(0..arc.fitted)))
+    }
+
+    /// Median over the arcs of the rms of the prediction, m, where anything is left to predict.
+    pub fn median_predicted_m(&self, level: &Level) -> Option<f64> {
+        let each: Vec<f64> = self.arcs.iter().zip(&level.fits).filter_map(|(arc, fit)| predicted_m(arc, fit)).collect();
+        (!each.is_empty()).then(|| median(each))
+    }
+}
+
+/// Rms of an arc's prediction beyond its fit, m.
+pub fn predicted_m(arc: &Arc, fit: &ArcFit) -> Option<f64> {
+    (arc.fitted < arc.t_s.len()).then(|| fit.rms_m(arc.fitted..arc.t_s.len()))
+}
+
+/// A baseline with one more term: known, or estimated with each satellite.
+pub fn with(baseline: &Baseline, term: Term) -> Baseline {
+    let mut more = baseline.clone();
+    match term {
+        Term::DegreesFrom(_) => more.degree = usize::MAX,
+        _ if term.is_known_size() => more.known.push(term),
+        _ => more.estimated.push(term),
+    }
+    more
+}
+
+/// Residuals and columns of the fitted epochs, with the state and the active terms projected out.
+struct Projected {
+    residual: DVector<f64>,
+    columns: DMatrix<f64>,
+    unknowns: usize,
+}
+
+fn rows_of(arc: &Arc, fit: &ArcFit, keep: impl Fn(Term) -> bool, wanted: Term) -> Projected {
+    let rows = 3 * arc.fitted;
+    let all = fit.partials.rows(0, rows);
+    let active: usize = fit.coefficients.iter().map(|(term, _)| term.parameters().len()).sum();
+    let mut base: Vec<usize> = (0..6).collect();
+    base.extend((0..active).filter(|j| keep(fit.columns[*j].0)).map(|j| 6 + j));
+    let of_wanted: Vec<usize> =
+        fit.columns.iter().enumerate().filter(|(_, (term, _))| *term == wanted).map(|(j, _)| 6 + j).collect();
+    let mut design = all.select_columns(&base);
+    for mut column in design.column_iter_mut() {
+        let norm = column.norm().max(1e-300);
+        column /= norm;
+    }
+    let q = design.qr().q();
+    let residual = DVector::from_iterator(rows, fit.residuals_m[..arc.fitted].iter().flat_map(|r| [r.x, r.y, r.z]));
+    let columns = all.select_columns(&of_wanted);
+    let residual = &residual - &q * q.tr_mul(&residual);
+    let columns = &columns - &q * q.tr_mul(&columns);
+    Projected { residual, columns, unknowns: base.len() }
+}
+
+fn independent(residual: &DVector<f64>, unknowns: usize) -> f64 {
+    let component = |axis: usize| residual.iter().skip(axis).step_by(3).copied().collect::<Vec<f64>>();
+    let n = residual.len() as f64 / memory(&[component(0), component(1), component(2)]);
+    n.max(unknowns as f64 + 6.0)
+}
+
+/// Evidence for a candidate in one arc. A term of known size is tried at that size, and pays for no parameter.
+pub fn evidence(arc: &Arc, fit: &ArcFit, term: Term) -> f64 {
+    let projected = rows_of(arc, fit, |_| true, term);
+    let before = projected.residual.norm_squared();
+    let (after, price) = if term.is_known_size() {
+        (&projected.residual - projected.columns.column_sum(), 0.0)
+    } else {
+        let Some(step) = super::arc::solve(&projected.columns, &projected.residual) else { return 0.0 };
+        (&projected.residual - &projected.columns * step, projected.columns.ncols() as f64)
+    };
+    let n = independent(&after, projected.unknowns);
+    n * (before / after.norm_squared().max(1e-300)).ln() - price * n.ln()
+}
+
+fn evidence_for_active(arc: &Arc, fit: &ArcFit, term: Term) -> f64 {
+    let Some(value) = fit.coefficient(term) else { return 0.0 };
+    let projected = rows_of(arc, fit, |t| t != term, term);
+    let scaled = DVector::from_iterator(
+        projected.columns.ncols(),
+        value.iter().take(projected.columns.ncols()).map(|v| v / term.scale()),
+    );
+    let n = independent(&projected.residual, projected.unknowns);
+    let without = (&projected.residual + &projected.columns * scaled).norm_squared();
+    let k = projected.columns.ncols() as f64;
+    n * (without / projected.residual.norm_squared().max(1e-300)).ln() - k * n.ln()
+}
+
+/// Estimates of a term's coefficients in one arc, jointly with the state and all active terms. For a term of known size
+/// that is in the model already, the estimate is of its fraction.
+pub fn estimates(problem: &Problem, level: &Level, i: usize, term: Term) -> Vec<Estimate> {
+    let (arc, fit) = (&problem.arcs[i], &level.fits[i]);
+    let own;
+    let fit = if fit.columns.iter().any(|(t, _)| *t == term) {
+        fit
+    } else {
+        own = arc.fit(&problem.environment, &level.baseline, &level.baseline.estimated, &[term], Some(fit));
+        &own
+    };
+    let projected = rows_of(arc, fit, |t| t != term, term);
+    let k = projected.columns.ncols();
+    let start: Vec<f64> = match fit.coefficient(term) {
+        Some(value) => value.iter().take(k).map(|v| v / term.scale()).collect(),
+        None if is_in(&level.baseline, term) => vec![1.0; k],
+        None => vec![0.0; k],
+    };
+    let normal = projected.columns.tr_mul(&projected.columns);
+    let (Some(step), Some(inverse)) =
+        (super::arc::solve(&projected.columns, &projected.residual), normal.try_inverse())
+    else {
+        return Vec::new();
+    };
+    let left = &projected.residual - &projected.columns * &step;
+    let unknowns = (projected.unknowns + k) as f64;
+    let component = |axis: usize| left.iter().skip(axis).step_by(3).copied().collect::<Vec<f64>>();
+    let red = memory(&[component(0), component(1), component(2)]);
+    let rows = left.len() as f64;
+    // The stated accuracy is a floor: residuals below it are luck, or a filter's smoothing.
+    let variance = (left.norm_squared() / (rows - unknowns).max(1.0)).max(0.25 * problem.sigma_m * problem.sigma_m);
+    let one = |j: usize| Estimate {
+        value: (start[j] + step[j]) * term.scale(),
+        sigma: (variance * red * inverse[(j, j)]).max(0.0).sqrt() * term.scale(),
+    };
+    (0..k).map(one).collect()
+}
+
+fn is_in(baseline: &Baseline, term: Term) -> bool {
+    match term {
+        Term::DegreesFrom(from) => baseline.degree >= from,
+        _ => baseline.known.contains(&term),
+    }
+}

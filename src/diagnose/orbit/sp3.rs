@@ -1,0 +1,207 @@
+//! SP3 precise orbits (versions a to d): text in, one track a satellite out.
+//!
+//! Missing positions (0.000000), predicted ones and isolated blunders are left out and counted, never filled. Not here:
+//! clocks, velocities, correlations.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use super::OrbitError;
+use crate::physics::earth_orientation::{GpsInstant, TAI_MINUS_GPS_S, lagrange_weights, tai_minus_utc_s};
+
+/// A position further than this from the polynomial through its neighbours is a blunder, m: polynomial and
+/// measurement together are good to decimetres at 15 minutes.
+const BLUNDER_M: f64 = 50.0;
+
+/// One satellite's positions in the Earth-fixed frame.
+#[derive(Debug, Clone, Default)]
+pub struct Track {
+    /// Such as `G05`.
+    pub id: String,
+    /// Seconds after the recording's origin, increasing.
+    pub t_s: Vec<f64>,
+    /// Earth-fixed positions, m.
+    pub fixed_m: Vec<Vector3<f64>>,
+    /// Epochs announced for the satellite and not usable.
+    pub masked: usize,
+    /// Epochs flagged as manoeuvres by the maker of the orbit.
+    pub manoeuvre_flags: usize,
+}
+
+/// A recording: one or more files of the same satellites.
+#[derive(Debug, Clone)]
+pub struct Recording {
+    /// The first epoch.
+    pub origin: GpsInstant,
+    /// The satellites, by name.
+    pub tracks: Vec<Track>,
+}
+
+impl Recording {
+    /// Read one or more files, given as (name, text); an epoch that two files hold is taken from the later.
+    pub fn read(files: &[(String, String)]) -> Result<Self, OrbitError> {
+        let mut satellites: BTreeMap<String, BTreeMap<i64, Found>> = BTreeMap::new();
+        let mut origin: Option<GpsInstant> = None;
+        for (name, text) in files {
+            read_file(name, text, &mut origin, &mut satellites)?;
+        }
+        let origin = origin.ok_or(OrbitError::Empty { what: "an epoch".to_owned() })?;
+        let first_us = satellites.values().filter_map(|found| found.keys().next()).min().copied().unwrap_or(0);
+        let shift_s = first_us as f64 / 1e6;
+        let tracks = satellites.into_iter().map(|(id, found)| track(id, found, shift_s)).collect();
+        Ok(Self { origin: origin.plus_s(shift_s), tracks })
+    }
+
+    /// Length of the recording, s.
+    pub fn span_s(&self) -> f64 {
+        self.tracks.iter().filter_map(|track| track.t_s.last()).copied().fold(0.0, f64::max)
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Found {
+    fixed_m: Vector3<f64>,
+    usable: bool,
+    manoeuvre: bool,
+}
+
+fn read_file(
+    name: &str,
+    text: &str,
+    origin: &mut Option<GpsInstant>,
+    satellites: &mut BTreeMap<String, BTreeMap<i64, Found>>,
+) -> Result<(), OrbitError> {
+    if !text.starts_with('#') {
+        let found = text.lines().next().unwrap_or("").chars().take(20).collect();
+        return Err(OrbitError::Sp3 { file: name.to_owned(), line: 1, expected: "a line starting with #", found });
+    }
+    let mut scale = String::from("GPS");
+    let mut now_us: Option<i64> = None;
+    for (i, line) in text.lines().enumerate() {
+        let bad = |expected| OrbitError::Sp3 { file: name.to_owned(), line: i + 1, expected, found: line.to_owned() };
+        match line.as_bytes().first() {
+            Some(b'%') if line.starts_with("%c") && line.get(9..12).is_some_and(|s| s != "ccc") => {
+                scale = line[9..12].to_owned();
+            }
+            Some(b'*') => {
+                let instant =
+                    epoch(line, &scale).ok_or_else(|| bad("an epoch: * year month day hour minute second"))?;
+                let base = *origin.get_or_insert(instant);
+                now_us = Some((instant.since_s(base) * 1e6).round() as i64);
+            }
+            Some(b'P') => {
+                let now_us = now_us.ok_or_else(|| bad("an epoch line before the first position"))?;
+                let (id, found) = position(line).ok_or_else(|| bad("P, a satellite and three coordinates in km"))?;
+                satellites.entry(id).or_default().insert(now_us, found);
+            }
+            _ if line.starts_with("EOF") => break,
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn epoch(line: &str, scale: &str) -> Option<GpsInstant> {
+    let fields: Vec<&str> = line[1..].split_whitespace().collect();
+    let &[year, month, day, hour, minute, second] = fields.as_slice() else { return None };
+    let s_of_day =
+        hour.parse::<f64>().ok()? * 3600.0 + minute.parse::<f64>().ok()? * 60.0 + second.parse::<f64>().ok()?;
+    let instant = GpsInstant::from_calendar(year.parse().ok()?, month.parse().ok()?, day.parse().ok()?, s_of_day)?;
+    match scale {
+        "TAI" => Some(instant.plus_s(-TAI_MINUS_GPS_S)),
+        "UTC" | "GLO" => Some(instant.plus_s(tai_minus_utc_s(instant.mjd).ok()? - TAI_MINUS_GPS_S)),
+        _ => Some(instant),
+    }
+}
+
+fn position(line: &str) -> Option<(String, Found)> {
+    let id = line.get(1..4)?.trim();
+    // Version a writes a bare number for a GPS satellite.
+    let id =
+        if id.starts_with(|c: char| c.is_ascii_alphabetic()) { id.replace(' ', "0") } else { format!("G{:0>2}", id) };
+    let km = |from: usize| line.get(from..from + 14)?.trim().parse::<f64>().ok();
+    let fixed_m = Vector3::new(km(4)?, km(18)?, km(32)?) * 1000.0;
+    let flag = |column: usize| line.as_bytes().get(column).copied().unwrap_or(b' ');
+    let usable = fixed_m.iter().all(|x| x.is_finite()) && fixed_m.norm() > 6.0e6 && flag(79) != b'P';
+    Some((id, Found { fixed_m, usable, manoeuvre: flag(78) == b'M' }))
+}
+
+fn track(id: String, found: BTreeMap<i64, Found>, shift_s: f64) -> Track {
+    let mut track = Track { id, ..Track::default() };
+    for (us, one) in found {
+        track.manoeuvre_flags += usize::from(one.manoeuvre);
+        if one.usable {
+            track.t_s.push(us as f64 / 1e6 - shift_s);
+            track.fixed_m.push(one.fixed_m);
+        } else {
+            track.masked += 1;
+        }
+    }
+    drop_blunders(&mut track);
+    track
+}
+
+/// Drop isolated positions that the eight neighbours contradict. In the Earth-fixed frame a 15-minute orbit is smooth
+/// enough for this; where the neighbours are uneven or far apart nothing is judged.
+fn drop_blunders(track: &mut Track) {
+    let n = track.t_s.len();
+    let miss = |i: usize| -> f64 {
+        if i < 4 || i + 4 >= n || track.t_s[i + 4] - track.t_s[i - 4] > 7_500.0 {
+            return 0.0;
+        }
+        let around: Vec<usize> = (i - 4..=i + 4).filter(|&j| j != i).collect();
+        let nodes: Vec<f64> = around.iter().map(|&j| track.t_s[j] - track.t_s[i]).collect();
+        let weights = lagrange_weights(&nodes, 0.0);
+        let through: Vector3<f64> = around.iter().zip(&weights).map(|(&j, w)| track.fixed_m[j] * *w).sum();
+        (through - track.fixed_m[i]).norm()
+    };
+    let misses: Vec<f64> = (0..n).map(miss).collect();
+    // A blunder spoils its neighbours' polynomials too, by less: only local maxima go.
+    let blunder = |i: usize| {
+        let around = i.saturating_sub(4)..(i + 5).min(n);
+        misses[i] > BLUNDER_M && around.clone().all(|j| misses[j] <= misses[i])
+    };
+    let keep: Vec<bool> = (0..n).map(|i| !blunder(i)).collect();
+    track.masked += keep.iter().filter(|k| !**k).count();
+    let mut kept = keep.iter();
+    track.t_s.retain(|_| *kept.next().unwrap_or(&true));
+    let mut kept = keep.iter();
+    track.fixed_m.retain(|_| *kept.next().unwrap_or(&true));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEAD: &str = "#cP2010  7  1  0  0  0.00000000       3 ORBIT IGS05 HLM  IGS\n\
+        %c G  cc GPS ccc cccc cccc cccc cccc ccccc ccccc ccccc ccccc\n";
+
+    fn read(body: &str) -> Result<Recording, OrbitError> {
+        Recording::read(&[("a.sp3".to_owned(), format!("{HEAD}{body}EOF\n"))])
+    }
+
+    #[test]
+    fn missing_positions_are_counted_and_left_out() {
+        let recording = read(
+            "*  2010  7  1  0  0  0.00000000\nPG01  18392.619117   7490.690408 -17846.346485 999999.999999\n\
+             PG02      0.000000      0.000000      0.000000 999999.999999\n\
+             *  2010  7  1  0 15  0.00000000\nPG01  18392.619117   7490.690408 -17846.346485 999999.999999\n\
+             PG02 -14889.160729  -5131.952946 -21416.801336    269.108429  7  6  8 110\n",
+        )
+        .unwrap();
+        let counts: Vec<_> = recording.tracks.iter().map(|t| (t.id.as_str(), t.t_s.len(), t.masked)).collect();
+        assert_eq!(counts, [("G01", 2, 0), ("G02", 1, 1)]);
+        assert_eq!(recording.tracks[1].t_s, [900.0]);
+        assert_eq!(recording.origin, GpsInstant { mjd: 55_378.0, s: 0.0 });
+    }
+
+    #[test]
+    fn a_broken_line_is_named_with_its_place() {
+        let error = read("*  2010  7  1  0  0  0.0\nPG01  oops\n").unwrap_err();
+        assert!(
+            error.to_string().starts_with("a.sp3, line 4: expected P, a satellite and three coordinates in km"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,396 @@
+//! A triad held still in many poses: the magnitude of gravity is the same in all, so what the ideal triad lacks shows in
+//! it (Tedaldi et al. 2014: bias, scale factors, axes not at right angles; a rigid rotation cannot show).
+//!
+//! a = s T K (u - u0 - b), K = diag(1 + k), T upper triangular with the three small angles. The common scale s is a nuisance.
+
+pub mod still;
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector, Dyn, Owned, Vector3};
+
+use self::still::{Pose, find_poses};
+use crate::diagnose::answer::{Located, Verdict};
+use crate::diagnose::measured::answer::{ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, parameter, posterior};
+use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, texts};
+
+/// Counts at zero acceleration, by the simulation.
+const ZERO_COUNTS: f64 = 32_768.0;
+/// Evidence needed for a term; as for orbits.
+const SCORE_MIN: f64 = 18.0;
+const POSES_MIN: usize = 14;
+
+/// A part of the sensor's model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Part {
+    /// Zero offset of each axis, counts.
+    Bias,
+    /// Each axis' scale beside the common one.
+    Scale,
+    /// Three angles.
+    NonOrthogonality,
+}
+
+impl Part {
+    /// All, in the catalogue's order.
+    pub const ALL: [Self; 3] = [Self::Bias, Self::Scale, Self::NonOrthogonality];
+
+    /// The catalogue's name.
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Bias => "bias",
+            Self::Scale => "scale_factor",
+            Self::NonOrthogonality => "non_orthogonality",
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Bias => "Zero offset",
+            Self::Scale => "Scale factors of the axes",
+            Self::NonOrthogonality => "Axes not at right angles",
+        }
+    }
+
+    /// Independent unknowns; the mean of the scale fractions belongs to the common scale.
+    fn unknowns(self) -> usize {
+        if self == Self::Scale { 2 } else { 3 }
+    }
+
+    fn names(self) -> [&'static str; 3] {
+        match self {
+            Self::Bias => ["x", "y", "z"],
+            Self::Scale => ["fraction_x", "fraction_y", "fraction_z"],
+            Self::NonOrthogonality => ["xy_rad", "xz_rad", "yz_rad"],
+        }
+    }
+
+    fn unit(self) -> &'static str {
+        match self {
+            Self::Bias => "counts",
+            Self::Scale => "1",
+            Self::NonOrthogonality => "rad",
+        }
+    }
+}
+
+/// A fitted sensor model.
+#[derive(Debug, Clone)]
+pub struct Triad {
+    /// Parts in the model.
+    pub parts: Vec<Part>,
+    /// Metres per second squared and count.
+    pub scale: f64,
+    unknowns: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// |a| - g for every pose fitted, m/s^2.
+    pub residuals: Vec<f64>,
+}
+
+impl Triad {
+    /// Rms of |a| - g, m/s^2.
+    pub fn rms(&self) -> f64 {
+        rms(&self.residuals)
+    }
+
+    /// Value and standard error of a part's three numbers.
+    pub fn values(&self, part: Part) -> [(f64, f64); 3] {
+        let Some(at) = place(&self.parts, part) else { return [(0.0, 0.0); 3] };
+        let unit = if part == Part::Bias { BIAS_UNIT } else { 1.0 };
+        let rows = part_rows(part);
+        std::array::from_fn(|k| {
+            let weights = &rows[k][..part.unknowns()];
+            let value: f64 = weights.iter().enumerate().map(|(j, w)| w * self.unknowns[at + j]).sum();
+            let mut variance = 0.0;
+            for (i, wi) in weights.iter().enumerate() {
+                for (j, wj) in weights.iter().enumerate() {
+                    variance += wi * wj * self.covariance[(at + i, at + j)];
+                }
+            }
+            (value * unit, variance.max(0.0).sqrt() * unit)
+        })
+    }
+
+    /// |a| - g this model gives for other poses, m/s^2.
+    pub fn predict(&self, poses: &[Pose], gravity: f64) -> Vec<f64> {
+        poses.iter().map(|pose| acceleration(&self.parts, &self.unknowns, pose).norm() - gravity).collect()
+    }
+}
+
+/// Biases are solved in thousands of counts, so that all unknowns are of one order.
+const BIAS_UNIT: f64 = 1000.0;
+
+/// How a part's three numbers follow from its unknowns: the scale fractions add to nothing.
+fn part_rows(part: Part) -> [[f64; 3]; 3] {
+    match part {
+        Part::Scale => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, -1.0, 0.0]],
+        _ => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+    }
+}
+
+fn place(parts: &[Part], part: Part) -> Option<usize> {
+    let at = parts.iter().position(|p| *p == part)?;
+    Some(1 + parts[..at].iter().map(|p| p.unknowns()).sum::<usize>())
+}
+
+fn three(parts: &[Part], unknowns: &DVector<f64>, part: Part) -> Vector3<f64> {
+    let Some(at) = place(parts, part) else { return Vector3::zeros() };
+    let rows = part_rows(part);
+    Vector3::from_fn(|k, _| (0..part.unknowns()).map(|j| rows[k][j] * unknowns[at + j]).sum())
+}
+
+fn acceleration(parts: &[Part], unknowns: &DVector<f64>, pose: &Pose) -> Vector3<f64> {
+    let bias = three(parts, unknowns, Part::Bias) * BIAS_UNIT;
+    let scale = three(parts, unknowns, Part::Scale);
+    let angle = three(parts, unknowns, Part::NonOrthogonality);
+    let raw = pose.mean - Vector3::repeat(ZERO_COUNTS) - bias;
+    // What the recording has: an axis that reads (1 + k) times the truth is divided by it.
+    let a = Vector3::from_fn(|k, _| raw[k] / (1.0 + scale[k])) * unknowns[0].exp();
+    Vector3::new(a.x - angle.x * a.y + angle.y * a.z, a.y - angle.z * a.z, a.z)
+}
+
+struct Problem<'a> {
+    parts: &'a [Part],
+    poses: &'a [Pose],
+    gravity: f64,
+    unknowns: DVector<f64>,
+}
+
+impl Problem<'_> {
+    fn at(&self, unknowns: &DVector<f64>) -> DVector<f64> {
+        let one = |pose: &Pose| acceleration(self.parts, unknowns, pose).norm() - self.gravity;
+        DVector::from_iterator(self.poses.len(), self.poses.iter().map(one))
+    }
+
+    /// Central differences: all unknowns are of order one, and the function is smooth.
+    fn slopes(&self) -> DMatrix<f64> {
+        const STEP: f64 = 1e-5;
+        let mut slopes = DMatrix::zeros(self.poses.len(), self.unknowns.len());
+        for k in 0..self.unknowns.len() {
+            let (mut up, mut down) = (self.unknowns.clone(), self.unknowns.clone());
+            up[k] += STEP;
+            down[k] -= STEP;
+            slopes.set_column(k, &((self.at(&up) - self.at(&down)) / (2.0 * STEP)));
+        }
+        slopes
+    }
+}
+
+impl levenberg_marquardt::LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
+    type ParameterStorage = Owned<f64, Dyn>;
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+
+    fn set_params(&mut self, x: &DVector<f64>) {
+        self.unknowns.copy_from(x);
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.unknowns.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        Some(self.at(&self.unknowns))
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        Some(self.slopes())
+    }
+}
+
+/// Fit the common scale and the parts to the poses.
+pub fn fit(parts: &[Part], poses: &[Pose], gravity: f64) -> Triad {
+    let size: f64 =
+        poses.iter().map(|p| (p.mean - Vector3::repeat(ZERO_COUNTS)).norm()).sum::<f64>() / poses.len() as f64;
+    let mut unknowns = DVector::zeros(1 + parts.iter().map(|p| p.unknowns()).sum::<usize>());
+    unknowns[0] = (gravity / size).ln();
+    let start = Problem { parts, poses, gravity, unknowns };
+    let (solved, _) = levenberg_marquardt::LevenbergMarquardt::new().minimize(start);
+    let residuals: Vec<f64> = solved.at(&solved.unknowns).iter().copied().collect();
+    let slopes = solved.slopes();
+    let free = (poses.len() as f64 - solved.unknowns.len() as f64).max(1.0);
+    let variance = residuals.iter().map(|r| r * r).sum::<f64>() / free;
+    let n = solved.unknowns.len();
+    let inverse =
+        slopes.tr_mul(&slopes).try_inverse().unwrap_or_else(|| DMatrix::from_diagonal_element(n, n, f64::MAX));
+    let scale = solved.unknowns[0].exp();
+    Triad { parts: parts.to_vec(), scale, unknowns: solved.unknowns, covariance: inverse * variance, residuals }
+}
+
+/// Parts found, with the evidence for each, and the fits on the way.
+pub struct Found {
+    /// Fits: before anything was added, then after each step.
+    pub fits: Vec<Triad>,
+    /// Parts in the order they were added, with their evidence.
+    pub added: Vec<(Part, f64)>,
+    /// Evidence of the strongest part refused.
+    pub refused: f64,
+}
+
+/// Forward search from the parts the simulation has. A part may be needed only together with another (scale factors
+/// show little while the axes' angles are wrong), so pairs are tried when no single part convinces.
+pub fn search(included: &[Part], poses: &[Pose], gravity: f64) -> Found {
+    let mut fits = vec![fit(included, poses, gravity)];
+    let mut added: Vec<(Part, f64)> = Vec::new();
+    loop {
+        let now = &fits[fits.len() - 1];
+        let open: Vec<Part> = Part::ALL.into_iter().filter(|p| !now.parts.contains(p)).collect();
+        let mut best: (f64, Vec<Part>) = (0.0, Vec::new());
+        let mut sets: Vec<Vec<Part>> = open.iter().map(|p| vec![*p]).collect();
+        if open.len() == 2 {
+            sets.push(open.clone());
+        }
+        for set in sets {
+            let parts: Vec<Part> = now.parts.iter().chain(&set).copied().collect();
+            let score = evidence(now, &fit(&parts, poses, gravity), &set);
+            if score > best.0 && (set.len() == 1 || best.0 < SCORE_MIN) {
+                best = (score, set);
+            }
+        }
+        if best.0 < SCORE_MIN {
+            return Found { fits, added, refused: best.0 };
+        }
+        for part in best.1 {
+            let mut parts = fits[fits.len() - 1].parts.clone();
+            parts.push(part);
+            added.push((part, best.0));
+            fits.push(fit(&parts, poses, gravity));
+        }
+    }
+}
+
+fn evidence(before: &Triad, after: &Triad, set: &[Part]) -> f64 {
+    let n = after.residuals.len() as f64;
+    let k: usize = set.iter().map(|p| p.unknowns()).sum();
+    2.0 * n * (before.rms() / after.rms().max(1e-12)).ln() - k as f64 * n.ln()
+}
+
+/// Analyse a case of static poses.
+pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Answer, MeasuredError> {
+    let gravity =
+        case.number("recording.gravity_m_s2")?.ok_or_else(|| case.wrong("recording.gravity_m_s2", "a number"))?;
+    let poses = poses(case, files)?;
+    let found = search(&included(case)?, &poses, gravity);
+    Ok(answer(case, &poses, gravity, &found))
+}
+
+/// The parts that the simulation has.
+pub fn included(case: &MeasuredCase) -> Result<Vec<Part>, MeasuredError> {
+    let mut parts = Vec::new();
+    for token in case.includes.iter().filter(|t| t.as_str() != "ideal_triad" && t.as_str() != "constant") {
+        let part = Part::ALL
+            .into_iter()
+            .find(|p| p.id() == token || (token == "misalignment" && *p == Part::NonOrthogonality));
+        parts.push(part.ok_or_else(|| {
+            case.wrong("simulation.includes", "some of ideal_triad, bias, scale_factor, non_orthogonality")
+        })?);
+    }
+    Ok(parts)
+}
+
+/// The static poses of the case's recording.
+pub fn poses(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Vec<Pose>, MeasuredError> {
+    let name = case.text("recording.file")?;
+    let columns = texts(&case.table, "recording.columns");
+    let rows = still::read(&name, &files[&name], columns.as_deref())?;
+    let poses = find_poses(&rows);
+    if poses.len() < POSES_MIN {
+        return Err(MeasuredError::TooFew { what: "static poses", found: poses.len(), expected: POSES_MIN });
+    }
+    Ok(poses)
+}
+
+fn effect(fit: &Triad, part: Part, score: f64, was: f64) -> Effect {
+    let values = fit.values(part);
+    let parameters = (0..3).map(|k| parameter(part.names()[k], values[k].0, values[k].1, part.unit())).collect();
+    let largest = (0..3).max_by(|a, b| values[*a].0.abs().total_cmp(&values[*b].0.abs())).unwrap_or(0);
+    let extra = match part {
+        Part::Bias => format!(" In m/s^2 its largest is {:.4}.", values[largest].0 * fit.scale),
+        Part::Scale => " Fractions are beside the common scale and add to nothing.".to_owned(),
+        Part::NonOrthogonality => " A rigid rotation of the triad cannot show in a magnitude.".to_owned(),
+    };
+    let why = format!("With it |a| - g falls from {was:.5} to {:.5} m/s^2 rms.{extra}", fit.rms());
+    let axis = (part == Part::Scale).then(|| ["x", "y", "z"][largest].to_owned());
+    let (id, name) = (part.id().to_owned(), part.name().to_owned());
+    Effect { id, name, posterior: posterior(score), parameters, axis, from_degree: None, why, rms: vec![fit.rms()] }
+}
+
+fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> Answer {
+    let (first, last) = (&found.fits[0], &found.fits[found.fits.len() - 1]);
+    // One reading's own scatter: poses that disagree by more than that hold something the model lacks.
+    let reading = poses.iter().map(|p| p.scatter).sum::<f64>() / poses.len() as f64 * last.scale;
+    let verdict = match (found.added.is_empty(), last.rms() > reading) {
+        (_, true) => Verdict::Unexplained,
+        (true, false) => Verdict::Consistent,
+        (false, false) => Verdict::Explained,
+    };
+    let mut effects = Vec::new();
+    for (i, (part, score)) in found.added.iter().enumerate() {
+        let mut one = effect(last, *part, *score, found.fits[i].rms());
+        one.rms = vec![found.fits[i + 1].rms()];
+        effects.push(one);
+    }
+    let step = |(i, fit): (usize, &Triad)| StepAnswer {
+        added: i.checked_sub(1).map(|i| found.added[i].0.id().to_owned()),
+        rms: fit.rms(),
+        predicted_rms: Some(held_out(&fit.parts, poses, gravity)),
+        score: i.checked_sub(1).map(|i| found.added[i].1),
+    };
+    let level = |fit: &Triad| Level {
+        rms: vec![fit.rms()],
+        rms_total: fit.rms(),
+        whitened_chi2_per_dof: (fit.rms() / reading).powi(2),
+    };
+    let (before, after) = (held_out(&first.parts, poses, gravity), held_out(&last.parts, poses, gravity));
+    let held = HeldOut {
+        scheme: "every other pose fitted, the rest predicted, both ways".to_owned(),
+        before_rms: vec![before],
+        after_rms: vec![after],
+        excess_removed: 1.0 - (after / before).powi(2),
+    };
+    let arc = ArcAnswer {
+        id: "poses".to_owned(),
+        verdict,
+        effects: effects.clone(),
+        fitted_beside: Vec::new(),
+        rms_before: first.rms(),
+        rms_after: last.rms(),
+        predicted_rms: Some(after),
+        fitted: poses.len(),
+        masked: 0,
+        note: None,
+    };
+    Answer {
+        schema: "oare.diagnosis/1".to_owned(),
+        case: case.id.clone(),
+        verdict,
+        false_alarm_probability: (-0.5 * found.added.last().map_or(found.refused, |a| a.1)).exp().clamp(1e-12, 1.0),
+        located: Located::default(),
+        effects,
+        alternatives: Vec::new(),
+        hypothesis: None,
+        unit: "m/s^2".to_owned(),
+        fit: Fit { noise_floor: vec![reading], before: level(first), after: level(last), held_out: Some(held) },
+        upper_limits: Vec::new(),
+        separating_observation: None,
+        cannot_tell_apart: Vec::new(),
+        arcs: vec![arc],
+        steps: found.fits.iter().enumerate().map(step).collect(),
+        notes: vec![format!(
+            "{} static poses were found; the common scale is estimated with every model.",
+            poses.len()
+        )],
+    }
+}
+
+fn held_out(parts: &[Part], poses: &[Pose], gravity: f64) -> f64 {
+    let half = |odd: usize| poses.iter().skip(odd).step_by(2).copied().collect::<Vec<Pose>>();
+    let (even, odd) = (half(0), half(1));
+    let mut missed = fit(parts, &even, gravity).predict(&odd, gravity);
+    missed.extend(fit(parts, &odd, gravity).predict(&even, gravity));
+    rms(&missed)
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
+}
