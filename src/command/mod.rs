@@ -1,13 +1,10 @@
 //! The commands of `oare`, one a file: arguments in, exit code out. The work is in the library.
 
 pub mod challenge;
+mod challenge_real;
 pub mod demo;
 pub mod diagnose;
 pub mod export;
-mod challenge_real;
-
-use std::process::ExitCode;
-
 pub mod process;
 pub mod replay;
 pub mod serve;
