@@ -280,7 +280,7 @@ fn take(recording: &Recording, keep: &[usize]) -> Recording {
 }
 
 /// Share of the noise by which a straight line between grid points may miss the simulated signal.
-const ROUGHNESS_MAX: f64 = 0.5;
+const ROUGHNESS_MAX: f64 = 0.3;
 
 /// The windows in which the simulation's grid resolves its own signal: between grid points it is known to about an eighth
 /// of the second difference, and where that is not small against the noise a comparison says nothing.
