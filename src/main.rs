@@ -18,6 +18,16 @@ struct Arguments {
 enum Command {
     /// Dumps in, product files out: the pipeline without sockets.
     Process(command::process::Args),
+    /// A mission flown: its dump and its truth.
+    Simulate(command::simulate::Args),
+    /// The service: dumps in at a TCP port, products out over HTTP and WebSocket.
+    Serve(command::serve::Args),
+    /// Sends dump files as a recorder playback would arrive.
+    Replay(command::replay::Args),
+    /// Products out of a data directory.
+    Export(command::export::Args),
+    /// Says what physics a simulation left out, from a case directory.
+    Diagnose(command::diagnose::Args),
     /// Makes, seals, runs and scores concealed cases.
     Challenge(command::challenge::Args),
 }
@@ -25,6 +35,11 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Process(args) => command::process::run(args),
+        Command::Simulate(args) => command::simulate::run(args),
+        Command::Serve(args) => command::serve::run(args),
+        Command::Replay(args) => command::replay::run(args),
+        Command::Export(args) => command::export::run(args),
+        Command::Diagnose(args) => command::diagnose::run(args),
         Command::Challenge(args) => command::challenge::run(args),
     };
     done.unwrap_or_else(|error| {

@@ -1,1 +1,218 @@
-//! The service, wired together from start to drain.
+//! The service, wired together from start to drain: ports, raw log, station, hub, API, recording.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::{Arc, RwLock};
+use std::time::{Duration, Instant};
+
+use tokio::net::TcpListener;
+use tokio::sync::{Semaphore, mpsc};
+use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
+
+use crate::api::{self, App, Metrics};
+use crate::config::{Config, ConfigFaults};
+use crate::hub::Hub;
+use crate::hub::status::{Board, Phase};
+use crate::ingest::listener::{self, QUEUED_READS_MAX, Rules};
+use crate::ingest::raw_log::{RawLog, StoreError};
+use crate::ingest::writer::{SharedStation, StationSamples, Writer};
+use crate::pipeline::Station;
+use crate::record::{RecordError, recorder};
+
+/// HTTP requests under way have this long to end after the drain.
+const HTTP_PATIENCE: Duration = Duration::from_secs(5);
+
+/// Why the service did not start, or ended otherwise than it was asked to.
+#[derive(Debug, thiserror::Error)]
+pub enum ServiceError {
+    /// An address cannot be listened at.
+    #[error("cannot listen at {address} for {purpose}: {source}")]
+    Bind {
+        /// The address.
+        address: SocketAddr,
+        /// What for.
+        purpose: &'static str,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// An address that nothing protects.
+    #[error(transparent)]
+    Exposed(#[from] ConfigFaults),
+    /// The raw log.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The recording.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// Serving HTTP ended.
+    #[error("serving HTTP ended: {0}")]
+    Http(io::Error),
+    /// A part of the service panicked.
+    #[error("a part of the service panicked: {0}")]
+    Panicked(String),
+}
+
+/// A running service.
+pub struct Service {
+    /// Where dumps are taken.
+    pub ingest_address: SocketAddr,
+    /// Where products are served.
+    pub http_address: SocketAddr,
+    /// The products.
+    pub hub: Arc<Hub>,
+    /// What it says of itself.
+    pub board: Arc<Board>,
+    /// The pipeline.
+    pub station: SharedStation,
+    drain: CancellationToken,
+    give_up: CancellationToken,
+    closing: CancellationToken,
+    listening: JoinHandle<()>,
+    writing: JoinHandle<Result<(), StoreError>>,
+    recording: Option<(CancellationToken, JoinHandle<Result<(), RecordError>>)>,
+    serving: JoinHandle<io::Result<()>>,
+    drain_timeout: Duration,
+}
+
+async fn bind(address: SocketAddr, purpose: &'static str) -> Result<TcpListener, ServiceError> {
+    TcpListener::bind(address).await.map_err(|source| ServiceError::Bind { address, purpose, source })
+}
+
+impl Service {
+    /// Starts everything: the ports first, so that a busy one is told before anything is touched; then the raw log is read again
+    /// (`/readyz` says so); then dumps are taken.
+    ///
+    /// # Errors
+    /// When a port is busy, the configuration exposes the service, or the store cannot be used.
+    pub async fn start(config: Config) -> Result<Self, ServiceError> {
+        let exposed = config.exposure_faults();
+        if !exposed.is_empty() {
+            return Err(ConfigFaults(exposed).into());
+        }
+        let ingest = bind(config.ingest.address, "dumps").await?;
+        let http = bind(config.http.address, "HTTP").await?;
+        let address_of = |listener: &TcpListener| listener.local_addr().map_err(ServiceError::Http);
+        let (ingest_address, http_address) = (address_of(&ingest)?, address_of(&http)?);
+        let settings = config.settings.clone();
+        let log = Arc::new(RawLog::open(&config.data_dir, &settings.mission, settings.link.spacecraft_id)?);
+        let station: SharedStation = Arc::new(RwLock::new(Station::new(settings.clone(), None)));
+        let samples = Arc::new(StationSamples(station.clone()));
+        let queue = config.http.live_queue_messages;
+        let hub = Arc::new(Hub::new(&settings.mission, settings.link.spacecraft_id, queue, samples));
+        let board = Arc::new(Board::default());
+        let closing = CancellationToken::new();
+        let app = Arc::new(App {
+            hub: hub.clone(),
+            board: board.clone(),
+            station: station.clone(),
+            mission: settings.time,
+            started: Instant::now(),
+            token: config.http.token.clone(),
+            live_permits: Arc::new(Semaphore::new(config.http.live_clients_max)),
+            live_behind_max: config.http.live_behind_messages as u64,
+            data_dir: config.data_dir.clone(),
+            closing: closing.clone(),
+            metrics: Metrics::default(),
+        });
+        let serving = tokio::spawn(serve(http, app, closing.clone()));
+        let writer = {
+            let (log, station, hub, board) = (log.clone(), station.clone(), hub.clone(), board.clone());
+            blocking(move || Writer::restore(log, station, hub, board)).await??
+        };
+        let recording = match config.recording {
+            false => None,
+            true => Some(start_recording(&config, &log, &hub, &board)?),
+        };
+        board.enter(Phase::Running);
+        let (drain, give_up) = (CancellationToken::new(), CancellationToken::new());
+        let (parts_in, parts_out) = mpsc::channel(QUEUED_READS_MAX);
+        let writing = {
+            let (runtime, give_up) = (tokio::runtime::Handle::current(), give_up.clone());
+            tokio::task::spawn_blocking(move || writer.run(&runtime, parts_out, &give_up))
+        };
+        let rules = Rules {
+            link: settings.link,
+            allow: config.ingest.allow.clone(),
+            open: config.http.insecure,
+            connections_max: config.ingest.connections_max,
+            idle_timeout: config.ingest.idle_timeout,
+            drain_timeout: config.ingest.drain_timeout,
+        };
+        let listening = tokio::spawn(listener::run(ingest, rules, parts_in, board.clone(), drain.clone()));
+        let drain_timeout = config.ingest.drain_timeout;
+        Ok(Self {
+            ingest_address,
+            http_address,
+            hub,
+            board,
+            station,
+            drain,
+            give_up,
+            closing,
+            listening,
+            writing,
+            recording,
+            serving,
+            drain_timeout,
+        })
+    }
+
+    /// Ends in order: no new connection, what is being sent is taken and made durable, recordings are finished, readers are told.
+    ///
+    /// # Errors
+    /// When the store refused to the end, or a part of the service had failed.
+    pub async fn drain(self) -> Result<(), ServiceError> {
+        self.board.enter(Phase::Draining);
+        self.drain.cancel();
+        let give_up = self.give_up.clone();
+        let patience = self.drain_timeout + HTTP_PATIENCE;
+        let hurry = tokio::spawn(async move {
+            tokio::time::sleep(patience).await;
+            give_up.cancel();
+        });
+        joined(self.listening.await)?;
+        let written = joined(self.writing.await)?;
+        hurry.abort();
+        let recorded = match self.recording {
+            None => Ok(()),
+            Some((finish, recording)) => {
+                finish.cancel();
+                joined(recording.await)?
+            }
+        };
+        self.closing.cancel();
+        match tokio::time::timeout(HTTP_PATIENCE, self.serving).await {
+            Ok(served) => joined(served)?.map_err(ServiceError::Http)?,
+            Err(_) => tracing::warn!("some HTTP clients did not end in time"),
+        }
+        written?;
+        recorded?;
+        Ok(())
+    }
+}
+
+async fn serve(listener: TcpListener, app: Arc<App>, closing: CancellationToken) -> io::Result<()> {
+    axum::serve(listener, api::router(app)).with_graceful_shutdown(closing.cancelled_owned()).await
+}
+
+fn start_recording(
+    config: &Config,
+    log: &Arc<RawLog>,
+    hub: &Arc<Hub>,
+    board: &Arc<Board>,
+) -> Result<(CancellationToken, JoinHandle<Result<(), RecordError>>), ServiceError> {
+    let finish = CancellationToken::new();
+    let recorder =
+        recorder::Recorder::start(&config.data_dir, &config.settings, log.clone(), hub.clone(), board.clone())?;
+    let (runtime, finished) = (tokio::runtime::Handle::current(), finish.clone());
+    Ok((finish, tokio::task::spawn_blocking(move || recorder.run(&runtime, &finished))))
+}
+
+async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, ServiceError> {
+    joined(tokio::task::spawn_blocking(work).await)
+}
+
+fn joined<T>(result: Result<T, tokio::task::JoinError>) -> Result<T, ServiceError> {
+    result.map_err(|error| ServiceError::Panicked(error.to_string()))
+}

@@ -1,1 +1,101 @@
-//! HTTP and WebSocket.
+//! HTTP and WebSocket: routes, live messages, wire types, errors, the dashboard.
+//!
+//! Handlers read what the hub and the board hold; none of them waits for the writer but those in `records`, which do so off
+//! the runtime's threads.
+
+mod accel;
+mod dashboard;
+mod guard;
+mod live;
+mod problem;
+mod query;
+mod records;
+mod status;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use axum::http::{Method, StatusCode, Uri};
+use axum::routing::get;
+use axum::{Json, Router, middleware};
+use tokio::sync::Semaphore;
+use tokio_util::sync::CancellationToken;
+use utoipa::openapi::{InfoBuilder, OpenApi, OpenApiBuilder};
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+use crate::hub::Hub;
+use crate::hub::status::Board;
+use crate::ingest::writer::SharedStation;
+use crate::units::MissionTime;
+use problem::Problem;
+pub use status::Metrics;
+
+/// What handlers share.
+pub struct App {
+    /// The products.
+    pub hub: Arc<Hub>,
+    /// What the service says of itself.
+    pub board: Arc<Board>,
+    /// The pipeline, for questions about the past.
+    pub station: SharedStation,
+    /// The mission's times.
+    pub mission: MissionTime,
+    /// When the service started.
+    pub started: Instant,
+    /// The bearer token, if one is needed.
+    pub token: Option<String>,
+    /// A permit per WebSocket client.
+    pub live_permits: Arc<Semaphore>,
+    /// A WebSocket client further behind than this many messages is told what it missed.
+    pub live_behind_max: u64,
+    /// Where a diagnosis may lie.
+    pub data_dir: PathBuf,
+    /// Cancelled when WebSocket clients must go.
+    pub closing: CancellationToken,
+    /// The metrics.
+    pub metrics: Metrics,
+}
+
+/// Every route.
+pub fn router(app: Arc<App>) -> Router {
+    let (router, openapi) = documented().with_state(app.clone()).split_for_parts();
+    let openapi = Arc::new(described(openapi));
+    router
+        .route("/openapi.json", get(move || async move { Json(OpenApi::clone(&openapi)) }))
+        .merge(dashboard::routes())
+        .fallback(|uri: Uri| async move { Problem::not_found(format!("there is nothing at {}", uri.path())) })
+        .method_not_allowed_fallback(|method: Method, uri: Uri| async move {
+            let detail = format!("{} does not take {method}; GET", uri.path());
+            Problem::new(StatusCode::METHOD_NOT_ALLOWED, detail)
+        })
+        .layer(middleware::from_fn_with_state(app, guard::guard))
+}
+
+fn documented() -> OpenApiRouter<Arc<App>> {
+    OpenApiRouter::new()
+        .routes(routes!(accel::accel))
+        .routes(routes!(accel::history))
+        .routes(routes!(live::live))
+        .routes(routes!(records::calibration))
+        .routes(routes!(records::calibration_history))
+        .routes(routes!(records::gaps))
+        .routes(routes!(records::playbacks))
+        .routes(routes!(records::events))
+        .routes(routes!(records::anomalies))
+        .routes(routes!(records::diagnosis))
+        .routes(routes!(status::status))
+        .routes(routes!(status::healthz))
+        .routes(routes!(status::readyz))
+        .routes(routes!(status::metrics_text))
+}
+
+fn described(openapi: OpenApi) -> OpenApi {
+    let info = InfoBuilder::new()
+        .title("oare-ground")
+        .version(env!("CARGO_PKG_VERSION"))
+        .description(Some("Quasi-steady acceleration of the Orbiter in body axes, from OARE telemetry"));
+    let builder: OpenApiBuilder = openapi.into();
+    builder.info(info.build()).build()
+}

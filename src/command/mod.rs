@@ -2,10 +2,14 @@
 
 pub mod challenge;
 mod challenge_real;
+pub mod diagnose;
+pub mod export;
+pub mod process;
+pub mod replay;
+pub mod serve;
+pub mod simulate;
 
 use std::process::ExitCode;
-
-pub mod process;
 
 /// Done.
 pub const DONE: ExitCode = ExitCode::SUCCESS;
@@ -23,4 +27,15 @@ pub fn unusable() -> ExitCode {
 /// Done, and some input could not be used.
 pub fn done_in_part() -> ExitCode {
     ExitCode::from(3)
+}
+
+/// Logs go to standard error; `RUST_LOG` chooses which.
+pub fn log_to_stderr() {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+}
+
+/// The runtime of a service.
+pub fn runtime() -> anyhow::Result<tokio::runtime::Runtime> {
+    Ok(tokio::runtime::Builder::new_multi_thread().enable_all().build()?)
 }

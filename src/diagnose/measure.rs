@@ -94,6 +94,9 @@ pub fn coverage(clock_s: &[f64], spans: &[[f64; 2]]) -> Vec<f64> {
     share
 }
 
+/// Time constants after which a decaying push counts as gone (6e-6 of it is left).
+const DECAYED: f64 = 12.0;
+
 /// Window mean of a push that starts at `onset_s` and decays with `tau_s` (infinite: a step).
 pub fn decay(clock_s: &[f64], onset_s: f64, tau_s: f64) -> Vec<f64> {
     clock_s
@@ -101,7 +104,7 @@ pub fn decay(clock_s: &[f64], onset_s: f64, tau_s: f64) -> Vec<f64> {
         .map(|t| {
             let high = t + HALF_WINDOW_S - onset_s;
             let low = (t - HALF_WINDOW_S - onset_s).max(0.0);
-            if high <= 0.0 {
+            if high <= 0.0 || low > DECAYED * tau_s {
                 0.0
             } else if tau_s.is_infinite() {
                 (high - low) / (2.0 * HALF_WINDOW_S)

@@ -1,13 +1,30 @@
 //! A recording against its simulation: the noise, where they differ, what was left out, how the fit improves.
+//!
+//! The way of a case: [`case`] (read, checked) -> [`scene`] (residual and physics) -> [`noise`] and [`design`] (whitened columns)
+//! -> [`catalogue`] and [`open_form`] (what may be missing) -> [`search`] and [`solve`] (sets, weighed) -> [`null_table`] (how
+//! surprising) -> [`verdict`] with [`model`] and [`locate`] (what is said) -> [`answer`], [`report`].
 
+pub mod analysis;
 pub mod answer;
 pub mod case;
+pub mod catalogue;
+pub mod design;
 pub mod error;
+pub mod locate;
 pub mod measure;
 pub mod measured;
+pub mod model;
 pub mod noise;
+pub mod null_table;
+pub mod open_form;
 mod optimise;
 pub mod orbit;
 pub mod poses;
 pub mod report;
+pub mod scene;
+pub mod search;
 pub mod series;
+pub mod solve;
+pub mod verdict;
+
+pub use analysis::{Analysis, Settings, analyse, diagnose};

@@ -137,14 +137,16 @@ impl Whitener {
 
     /// Whitened innovations of a series at the windows.
     pub fn whiten(&self, series: &[f64]) -> Vec<f64> {
-        self.whiten_from(series, 0)
+        self.whiten_span(series, 0, series.len())
     }
 
-    /// The same for a series that is zero before window `first`; the answer starts there.
-    pub fn whiten_from(&self, series: &[f64], first: usize) -> Vec<f64> {
+    /// The same for a series that is zero outside windows `first..last`; the answer starts at `first` and ends where
+    /// what the filter remembers of the series is negligible (1e-5 of its largest value).
+    pub fn whiten_span(&self, series: &[f64], first: usize, last: usize) -> Vec<f64> {
         let (mut z0, mut z1, mut z2) = (0.0, 0.0, 0.0);
         let mut out = Vec::with_capacity(series.len() - first);
-        for (row, x) in self.rows[first..].iter().zip(&series[first..]) {
+        let (mut largest, mut quiet) = (0.0_f64, 0);
+        for (i, (row, x)) in self.rows[first..].iter().zip(&series[first..]).enumerate() {
             z1 *= row.decay[0];
             z2 *= row.decay[1];
             let innovation = x - row.h0 * z0 - row.h1 * z1 - z2;
@@ -152,6 +154,14 @@ impl Whitener {
             z1 += row.gain[1] * innovation;
             z2 += row.gain[2] * innovation;
             out.push(innovation * row.per_sd);
+            if first + i < last {
+                largest = largest.max((innovation * row.per_sd).abs());
+            } else {
+                quiet = if (innovation * row.per_sd).abs() < 1e-5 * largest { quiet + 1 } else { 0 };
+                if quiet > 8 {
+                    break;
+                }
+            }
         }
         out
     }
@@ -270,4 +280,24 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     lanes.iter().sum::<f64>() + tail
+}
+
+/// A record of noise alone: `normal` gives independent standard normal numbers.
+pub fn simulate(noise: &AxisNoise, schedule: &Schedule, activity: &[f64], mut normal: impl FnMut() -> f64) -> Vec<f64> {
+    let mut previous = noise.white_ng * normal();
+    let mut short = noise.short_ng * normal();
+    let mut slow = noise.slow_ng * normal();
+    (0..schedule.len())
+        .map(|i| {
+            let step = schedule.step_s[i];
+            let [f1, f2] = [(-step / noise.short_tau_s).exp(), (-step / noise.slow_tau_s).exp()];
+            short = f1 * short + (1.0 - f1 * f1).sqrt() * noise.short_ng * normal();
+            slow = f2 * slow + (1.0 - f2 * f2).sqrt() * noise.slow_ng * normal();
+            let own = noise.white_ng * normal();
+            let [a, b] = schedule.overlap[i];
+            let value = activity[i] * (a * own + b * previous + short) + slow;
+            previous = own;
+            value
+        })
+        .collect()
 }

@@ -1,3 +1,7 @@
-//! From the socket to the durable raw log. The byte decoding proper is in [`wire`] and pure.
+//! From the socket to the durable raw log and the products. The byte decoding proper is in [`wire`] and pure.
 
+mod batch;
+pub mod listener;
+pub mod raw_log;
 pub mod wire;
+pub mod writer;

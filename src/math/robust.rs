@@ -154,45 +154,56 @@ pub fn merge(left: &[i16], right: &[i16], merged: &mut Vec<i16>) {
     merged.clear();
     merged.resize(left.len() + right.len(), 0);
     let (mut i, mut j) = (0, 0);
-    for place in merged.iter_mut() {
-        // The end of a slice compares higher than any count; no branch depends on the data.
-        let a = left.get(i).map_or(i32::MAX, |count| i32::from(*count));
-        let b = right.get(j).map_or(i32::MAX, |count| i32::from(*count));
-        let take_left = a <= b;
-        *place = if take_left { a } else { b } as i16;
-        i += usize::from(take_left);
-        j += usize::from(!take_left);
+    let mut places = merged.iter_mut();
+    // Whose count comes next is a coin toss: no branch may depend on it.
+    while i < left.len() && j < right.len() {
+        let (a, b) = (left[i], right[j]);
+        let Some(place) = places.next() else { return };
+        *place = a.min(b);
+        let take_left = usize::from(a <= b);
+        i += take_left;
+        j += 1 - take_left;
     }
+    places.zip(left[i..].iter().chain(&right[j..])).for_each(|(place, count)| *place = *count);
 }
 
-/// Sorts counts in ascending order: a radix sort, two passes of eight bits, a pass left out when its digit is the same
+/// Most counts that one radix sort takes; more are left to the standard sort.
+const RADIX_COUNTS_MAX: usize = 256;
+
+/// Sorts counts in ascending order: a radix sort of two passes of eight bits, a pass left out when its digit is the same
 /// throughout.
-pub fn sort_counts(counts: &mut Vec<i16>, scratch: &mut Vec<i16>) {
-    scratch.clear();
-    scratch.resize(counts.len(), 0);
-    let key = |count: i16| (count as u16) ^ 0x8000;
-    let mut places = [[0u32; 256]; 2];
-    for count in counts.iter() {
-        let [low, high] = key(*count).to_le_bytes();
+pub fn sort_counts(counts: &mut [i16]) {
+    let points = counts.len();
+    if !(2..=RADIX_COUNTS_MAX).contains(&points) {
+        return counts.sort_unstable();
+    }
+    let mut keys = [0u16; RADIX_COUNTS_MAX];
+    let mut sorted = [0u16; RADIX_COUNTS_MAX];
+    let mut places = [[0u16; 256]; 2];
+    for (key, count) in keys.iter_mut().zip(counts.iter()) {
+        *key = (*count as u16) ^ 0x8000;
+        let [low, high] = key.to_le_bytes();
         places[0][usize::from(low)] += 1;
         places[1][usize::from(high)] += 1;
     }
     for (digit, places) in places.iter_mut().enumerate() {
-        let digit_of = |count: i16| usize::from(key(count).to_le_bytes()[digit]);
-        if counts.first().is_none_or(|first| places[digit_of(*first)] as usize == counts.len()) {
+        let digit_of = |key: u16| usize::from((key >> (8 * digit)) as u8);
+        if usize::from(places[digit_of(keys[0])]) == points {
             continue;
         }
         let mut next = 0;
         for place in places.iter_mut() {
             next += std::mem::replace(place, next);
         }
-        for count in counts.iter() {
-            let place = &mut places[digit_of(*count)];
-            scratch[*place as usize] = *count;
+        for key in &keys[..points] {
+            let place = &mut places[digit_of(*key)];
+            // Places never exceed the number of points: the mask only spares the check.
+            sorted[usize::from(*place) % RADIX_COUNTS_MAX] = *key;
             *place += 1;
         }
-        std::mem::swap(counts, scratch);
+        std::mem::swap(&mut keys, &mut sorted);
     }
+    counts.iter_mut().zip(keys).for_each(|(count, key)| *count = (key ^ 0x8000) as i16);
 }
 
 /// Median of a slice, which is reordered; None of none. For an even number the mean of the two inner points.
@@ -282,7 +293,7 @@ mod tests {
             }
             let mut expected = counts.clone();
             expected.sort_unstable();
-            sort_counts(&mut counts, &mut Vec::new());
+            sort_counts(&mut counts);
             prop_assert_eq!(counts, expected);
         }
 

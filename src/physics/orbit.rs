@@ -1,11 +1,11 @@
 //! An orbit about an oblate Earth: elements to state, propagation under mu and J2, and the angles one asks of it.
 //!
-//! Fixed-step Runge-Kutta of fourth order: 10 s steps keep 300 km orbits to centimetres a day. Not here: precise orbits,
+//! Fixed-step Runge-Kutta of fourth order: 10 s steps keep 300 km orbits to a metre a day. Not here: precise orbits,
 //! other bodies, the full field, drag on the orbit itself.
 
 use super::{EARTH_RADIUS_M, J2, MU_M3_S2, PhysicsError, Vec3};
 
-/// Longest step that keeps a low orbit to centimetres a day, s.
+/// Longest step that keeps a low orbit to a metre a day, s.
 pub const STEP_S_MAX: f64 = 10.0;
 
 /// Position and velocity, inertial.

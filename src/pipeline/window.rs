@@ -44,8 +44,7 @@ impl HalfWindow {
         for record in records {
             half.add(record, &mut digest);
         }
-        let mut scratch = Vec::new();
-        half.sorted.as_flattened_mut().iter_mut().for_each(|counts| sort_counts(counts, &mut scratch));
+        half.sorted.as_flattened_mut().iter_mut().for_each(|counts| sort_counts(counts));
         half.digest = digest.finalize().into();
         half
     }

@@ -1,8 +1,13 @@
 //! The whole, from outside: sample dumps through the core, the service through real sockets, the shape of the sources.
 
+mod api;
+mod bad_input;
 mod layering;
+mod live;
 mod samples;
+mod service_support;
 mod station;
+mod store;
 
 use std::path::{Path, PathBuf};
 

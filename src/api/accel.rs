@@ -1,0 +1,251 @@
+//! `/accel` and `/accel/history`.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Query, State};
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
+
+use super::App;
+use super::problem::Problem;
+use super::query::optional_clock;
+use crate::hub::wire::{Gap, Time, Window};
+use crate::pipeline::Product;
+use crate::units::Clock;
+
+/// The latest body-axis value.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Accel {
+    /// Start of the 50 s window.
+    #[serde(flatten)]
+    pub time: Time,
+    /// `orbiter_body`: +X tail to nose, +Y to starboard, +Z down through the belly.
+    pub frame: &'static str,
+    /// Quasi-steady acceleration from the adaptive trimmed mean, ng.
+    pub ax_ng: Option<f64>,
+    /// As `ax_ng`.
+    pub ay_ng: Option<f64>,
+    /// As `ax_ng`.
+    pub az_ng: Option<f64>,
+    /// One statistical standard error of `ax_ng`, ng.
+    pub sigma_ax_ng: Option<f64>,
+    /// Of `ay_ng`.
+    pub sigma_ay_ng: Option<f64>,
+    /// Of `az_ng`.
+    pub sigma_az_ng: Option<f64>,
+    /// The systematic part, to be added in quadrature, ng.
+    pub sigma_sys_ax_ng: Option<f64>,
+    /// Of `ay_ng`.
+    pub sigma_sys_ay_ng: Option<f64>,
+    /// Of `az_ng`.
+    pub sigma_sys_az_ng: Option<f64>,
+    /// From the plain mean of the window, ng.
+    pub mean_ax_ng: Option<f64>,
+    /// As `mean_ax_ng`.
+    pub mean_ay_ng: Option<f64>,
+    /// As `mean_ax_ng`.
+    pub mean_az_ng: Option<f64>,
+    /// Time since this service came to know the value, s.
+    pub age_s: f64,
+    /// `good`, or reasons for care.
+    pub quality: String,
+    /// Version of the calibration.
+    pub calibration: u32,
+    /// Hash of what the value was made from.
+    pub revision: String,
+    /// Mission and spacecraft it is of.
+    pub source: String,
+}
+
+/// The latest body-axis acceleration, with its standard error.
+#[utoipa::path(get, path = "/accel", tag = "acceleration",
+    responses((status = 200, body = Accel), (status = 404, description = "there is none yet")))]
+pub async fn accel(State(app): State<Arc<App>>) -> Result<Json<Accel>, Problem> {
+    let latest = app.hub.latest().ok_or_else(|| Problem::not_found("there is no calibrated window yet"))?;
+    let window = Window::new(&app.mission, &latest.product);
+    Ok(Json(Accel {
+        time: Time::new(&app.mission, latest.product.start),
+        frame: "orbiter_body",
+        ax_ng: window.ax_ng,
+        ay_ng: window.ay_ng,
+        az_ng: window.az_ng,
+        sigma_ax_ng: window.sigma_ax_ng,
+        sigma_ay_ng: window.sigma_ay_ng,
+        sigma_az_ng: window.sigma_az_ng,
+        sigma_sys_ax_ng: window.sigma_sys_ax_ng,
+        sigma_sys_ay_ng: window.sigma_sys_ay_ng,
+        sigma_sys_az_ng: window.sigma_sys_az_ng,
+        mean_ax_ng: window.mean_ax_ng,
+        mean_ay_ng: window.mean_ay_ng,
+        mean_az_ng: window.mean_az_ng,
+        age_s: (latest.since.elapsed().as_secs_f64() * 1000.0).round() / 1000.0,
+        quality: window.quality,
+        calibration: window.calibration,
+        revision: window.revision,
+        source: format!("{}/{:#x}", app.hub.mission(), app.hub.spacecraft_id()),
+    }))
+}
+
+/// A span of history.
+#[derive(Debug, Clone, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct Span {
+    /// First window start: clock seconds or RFC 3339; the first known without it.
+    pub from: Option<String>,
+    /// Last window start; the last known without it.
+    pub to: Option<String>,
+    /// At most so many buckets (1 to 100000; 2000 without it).
+    pub max_points: Option<String>,
+}
+
+/// Least, mean and greatest of the windows of a bucket.
+#[derive(Debug, Clone, Copy, Serialize, ToSchema)]
+pub struct Spread {
+    /// Least.
+    pub min: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Greatest.
+    pub max: f64,
+}
+
+/// Windows taken together.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Bucket {
+    /// Start of the first window in it, clock s.
+    pub from_clock_s: f64,
+    /// End of the last window in it, clock s.
+    pub to_clock_s: f64,
+    /// UTC of `from_clock_s`.
+    pub from_utc: String,
+    /// UTC of `to_clock_s`.
+    pub to_utc: String,
+    /// Windows in it.
+    pub count: usize,
+    /// Windows with an acceleration.
+    pub calibrated: usize,
+    /// X, ng; null without a calibrated window.
+    pub ax_ng: Option<Spread>,
+    /// Y, ng.
+    pub ay_ng: Option<Spread>,
+    /// Z, ng.
+    pub az_ng: Option<Spread>,
+    /// Root mean square of the windows' standard errors, ng.
+    pub sigma_ax_ng: Option<f64>,
+    /// Of Y.
+    pub sigma_ay_ng: Option<f64>,
+    /// Of Z.
+    pub sigma_az_ng: Option<f64>,
+    /// Mode of its first window.
+    pub mode: &'static str,
+    /// Quality of the window with most reasons for care.
+    pub worst_quality: String,
+}
+
+/// The answer of `/accel/history`.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct History {
+    /// `orbiter_body`.
+    pub frame: &'static str,
+    /// Windows in the span.
+    pub windows: usize,
+    /// In order of time; a bucket without a window is left out.
+    pub buckets: Vec<Bucket>,
+    /// Spans without telemetry that touch the span asked for.
+    pub gaps: Vec<Gap>,
+}
+
+/// Buckets asked for when nothing is said.
+const POINTS: usize = 2000;
+/// Most buckets of one answer.
+const POINTS_MAX: usize = 100_000;
+
+/// Body-axis acceleration over a span: min, mean and max in buckets.
+#[utoipa::path(get, path = "/accel/history", tag = "acceleration", params(Span),
+    responses((status = 200, body = History), (status = 400, description = "a parameter makes no sense")))]
+pub async fn history(State(app): State<Arc<App>>, Query(span): Query<Span>) -> Result<Json<History>, Problem> {
+    let from = optional_clock(&app.mission, "from", span.from.as_deref())?;
+    let to = optional_clock(&app.mission, "to", span.to.as_deref())?;
+    let points = points(span.max_points.as_deref())?;
+    if let (Some(from), Some(to)) = (from, to)
+        && from > to
+    {
+        let detail = format!("from is clock {} s, after to, clock {} s", from.seconds(), to.seconds());
+        return Err(Problem::bad_request(detail));
+    }
+    let Some((first, last)) = app.hub.span() else {
+        return Ok(Json(History { frame: "orbiter_body", windows: 0, buckets: Vec::new(), gaps: Vec::new() }));
+    };
+    let (from, to) = (from.unwrap_or(first), to.unwrap_or(last));
+    let products = app.hub.history(from, to);
+    let buckets = in_buckets(&products, from, to, points);
+    let picture = app.board.picture();
+    let touching = picture.gaps.iter().filter(|(start, end)| *end >= from && *start <= to);
+    Ok(Json(History {
+        frame: "orbiter_body",
+        windows: products.len(),
+        buckets: buckets.into_iter().map(|products| bucket(&app, products)).collect(),
+        gaps: touching.map(|(start, end)| Gap::new(&app.mission, *start, *end)).collect(),
+    }))
+}
+
+fn points(text: Option<&str>) -> Result<usize, Problem> {
+    let Some(text) = text else { return Ok(POINTS) };
+    match text.parse() {
+        Ok(points) if (1..=POINTS_MAX).contains(&points) => Ok(points),
+        _ => Err(Problem::bad_request(format!("max_points is {text:?}; a whole number from 1 to {POINTS_MAX}"))),
+    }
+}
+
+/// Windows (in order of time) cut into at most so many spans of equal length; single windows where that is few enough.
+fn in_buckets(products: &[Product], from: Clock, to: Clock, points: usize) -> Vec<&[Product]> {
+    if products.len() <= points {
+        return products.chunks(1).collect();
+    }
+    let span_tenths = (to.tenths() - from.tenths() + 1) as i128;
+    let bucket_of = |product: &Product| (product.start.tenths() - from.tenths()) as i128 * points as i128 / span_tenths;
+    products.chunk_by(|a, b| bucket_of(a) == bucket_of(b)).collect()
+}
+
+fn bucket(app: &App, products: &[Product]) -> Bucket {
+    const WINDOW_TENTHS: i64 = 500;
+    let (first, last) = (&products[0], &products[products.len() - 1]);
+    let end = last.start.plus_tenths(WINDOW_TENTHS);
+    let accelerations: Vec<_> = products.iter().filter_map(|product| product.acceleration.as_ref()).collect();
+    let n = accelerations.len();
+    let spread = |axis: usize| {
+        let values = || accelerations.iter().map(move |a| a.trimmed_ng.0[axis]);
+        (n > 0).then(|| Spread {
+            min: rounded(values().fold(f64::INFINITY, f64::min)),
+            mean: rounded(values().sum::<f64>() / n as f64),
+            max: rounded(values().fold(f64::NEG_INFINITY, f64::max)),
+        })
+    };
+    let sigma = |axis: usize| {
+        let squares: f64 = accelerations.iter().map(|a| a.sigma_ng.0[axis].powi(2)).sum();
+        (n > 0).then(|| rounded((squares / n as f64).sqrt()))
+    };
+    let worst = products.iter().map(|product| product.quality).max_by_key(|quality| (quality.reasons(), *quality));
+    Bucket {
+        from_clock_s: first.start.seconds(),
+        to_clock_s: end.seconds(),
+        from_utc: crate::hub::wire::utc(&app.mission, first.start),
+        to_utc: crate::hub::wire::utc(&app.mission, end),
+        count: products.len(),
+        calibrated: n,
+        ax_ng: spread(0),
+        ay_ng: spread(1),
+        az_ng: spread(2),
+        sigma_ax_ng: sigma(0),
+        sigma_ay_ng: sigma(1),
+        sigma_az_ng: sigma(2),
+        mode: first.mode.word(),
+        worst_quality: worst.unwrap_or_default().to_string(),
+    }
+}
+
+/// To the third decimal, as everywhere in ng; never a negative zero.
+fn rounded(ng: f64) -> f64 {
+    (ng * 1000.0).round() / 1000.0 + 0.0
+}

@@ -1,0 +1,66 @@
+//! What every request passes: its size, and its token where one is configured.
+
+use std::sync::Arc;
+
+use axum::extract::{Request, State};
+use axum::http::header::{AUTHORIZATION, CONTENT_LENGTH, WWW_AUTHENTICATE};
+use axum::http::{HeaderValue, StatusCode};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use sha2::{Digest, Sha256};
+
+use super::App;
+use super::problem::Problem;
+
+/// No request of this interface has a body; this much is read past and forgiven.
+pub const BODY_OCTETS_MAX: usize = 64 << 10;
+/// Longest path and query.
+const URI_OCTETS_MAX: usize = 8 << 10;
+/// Answered without a token: they tell nothing but that the service is there.
+const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
+
+/// Turns away what is too large or has no token, and counts what is answered.
+pub async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    let response = match refuse(&app, &request) {
+        Some(refusal) => refusal,
+        None => next.run(request).await,
+    };
+    app.metrics.count_response(response.status());
+    response
+}
+
+fn refuse(app: &App, request: &Request) -> Option<Response> {
+    let uri_octets = request.uri().path_and_query().map_or(0, |uri| uri.as_str().len());
+    if uri_octets > URI_OCTETS_MAX {
+        let detail = format!("the path and query have {uri_octets} octets; {URI_OCTETS_MAX} at most");
+        return Some(Problem::new(StatusCode::URI_TOO_LONG, detail).into_response());
+    }
+    let length = request.headers().get(CONTENT_LENGTH).and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+    if let Some(octets) = length.filter(|octets| *octets > BODY_OCTETS_MAX as u64) {
+        let detail = format!("the body has {octets} octets; {BODY_OCTETS_MAX} at most");
+        return Some(Problem::new(StatusCode::PAYLOAD_TOO_LARGE, detail).into_response());
+    }
+    let token = app.token.as_ref()?;
+    if OPEN_PATHS.contains(&request.uri().path()) || presented(request).is_some_and(|found| same(&found, token)) {
+        return None;
+    }
+    let detail = "this service needs its token: Authorization: Bearer TOKEN, or ?access_token=TOKEN";
+    let mut response = Problem::new(StatusCode::UNAUTHORIZED, detail).into_response();
+    response.headers_mut().insert(WWW_AUTHENTICATE, HeaderValue::from_static("Bearer realm=\"oare\""));
+    Some(response)
+}
+
+/// The token of a request: in its header, or in its query where a browser cannot set one.
+fn presented(request: &Request) -> Option<String> {
+    if let Some(value) = request.headers().get(AUTHORIZATION) {
+        let (scheme, token) = value.to_str().ok()?.split_once(' ')?;
+        return scheme.eq_ignore_ascii_case("bearer").then(|| token.trim().to_string());
+    }
+    let query = request.uri().query()?;
+    query.split('&').find_map(|pair| pair.strip_prefix("access_token=")).map(str::to_string)
+}
+
+/// Compares digests, so that the time taken says nothing about the token.
+fn same(found: &str, token: &str) -> bool {
+    Sha256::digest(found) == Sha256::digest(token)
+}

@@ -1,0 +1,223 @@
+//! `/accel/live`: the messages of the hub over a WebSocket, numbered, from history to live without a hole or a repeat.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::ws::{CloseFrame, Message as Frame, Utf8Bytes, WebSocket, WebSocketUpgrade, close_code};
+use axum::extract::{Query, State};
+use axum::http::StatusCode;
+use axum::response::Response;
+use bytes::Bytes;
+use futures_util::{SinkExt, StreamExt, stream::SplitSink};
+use serde::Deserialize;
+use utoipa::IntoParams;
+
+use super::App;
+use super::problem::Problem;
+use super::query::clock;
+use crate::hub::status::count;
+use crate::hub::wire::message_members;
+use crate::hub::{Message, Reader, Step, Topic, Topics};
+use crate::units::Clock;
+
+/// Messages written before the socket is flushed.
+const AT_ONCE: usize = 256;
+/// A client that takes nothing for this long is gone.
+const WRITE_PATIENCE: Duration = Duration::from_secs(60);
+/// A ping goes out after this much silence.
+const PING_EVERY: Duration = Duration::from_secs(20);
+/// A client sends nothing but pongs; larger messages end the connection.
+const CLIENT_MESSAGE_OCTETS_MAX: usize = 4 << 10;
+
+/// From where, and what.
+#[derive(Debug, Clone, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct Wish {
+    /// `now` (the default), a clock (seconds or RFC 3339): history from there on first, or `seq:N`: what came after message N.
+    pub from: Option<String>,
+    /// Topics with commas between: window (the default), raw, calibration, event, anomaly, diagnosis.
+    pub topics: Option<String>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum From {
+    Now,
+    Clock(Clock),
+    Seq(u64),
+}
+
+/// Live messages over a WebSocket.
+#[utoipa::path(get, path = "/accel/live", tag = "acceleration", params(Wish),
+    responses((status = 101, description = "one JSON object a message: seq, prev, type, ..."), (status = 400, description = "a parameter makes no sense")))]
+pub async fn live(
+    State(app): State<Arc<App>>,
+    Query(wish): Query<Wish>,
+    upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
+) -> Result<Response, Problem> {
+    let words = wish.topics.as_deref().unwrap_or("window");
+    let topics = Topics::from_words(words).ok().filter(|topics| *topics != Topics::NONE).ok_or_else(|| {
+        let known = Topic::ALL.map(Topic::word).join(", ");
+        Problem::bad_request(format!("topics is {words:?}; one or more of {known}, with commas between"))
+    })?;
+    let from = match wish.from.as_deref() {
+        None | Some("now" | "") => From::Now,
+        Some(text) => match text.strip_prefix("seq:") {
+            Some(seq) => From::Seq(
+                seq.parse().map_err(|_| Problem::bad_request(format!("from is {text:?}; seq:N has a whole number")))?,
+            ),
+            None => From::Clock(clock(&app.mission, "from", text)?),
+        },
+    };
+    let head = app.hub.head_seq();
+    if let From::Seq(seq) = from
+        && seq > head
+    {
+        return Err(Problem::bad_request(format!("from is seq:{seq}; the last message so far is {head}")));
+    }
+    let upgrade = upgrade.map_err(|rejection| Problem::bad_request(rejection.to_string()))?;
+    let permit = app.live_permits.clone().try_acquire_owned().map_err(|_| {
+        Problem::new(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "as many WebSocket clients as are allowed (http.live_clients_max) are connected",
+        )
+    })?;
+    Ok(upgrade.max_message_size(CLIENT_MESSAGE_OCTETS_MAX).on_upgrade(move |socket| async move {
+        let counters = &app.board.counters;
+        count(&counters.live_clients, 1);
+        let _ = serve(&app, socket, from, topics).await;
+        counters.live_clients.fetch_sub(1, std::sync::atomic::Ordering::Relaxed);
+        drop(permit);
+    }))
+}
+
+/// The client is gone, or took nothing for too long.
+struct Gone;
+
+struct Client<'a> {
+    app: &'a App,
+    socket: SplitSink<WebSocket, Frame>,
+    topics: Topics,
+    /// Number of the last message sent on its topics.
+    prev: u64,
+}
+
+async fn serve(app: &Arc<App>, socket: WebSocket, from: From, topics: Topics) -> Result<(), Gone> {
+    let (sink, mut incoming) = socket.split();
+    let (history, after) = match from {
+        From::Now => (Vec::new(), app.hub.head_seq()),
+        From::Seq(seq) => (Vec::new(), seq),
+        From::Clock(clock) => app.hub.known_from(clock, topics),
+    };
+    let prev = match from {
+        From::Now | From::Seq(_) => app.hub.last_seq_on(topics, after),
+        From::Clock(_) => 0,
+    };
+    let mut client = Client { app, socket: sink, topics, prev };
+    client.hello(from, after).await?;
+    for messages in history.chunks(AT_ONCE) {
+        client.send(messages).await?;
+    }
+    drop(history);
+    let mut reader = app.hub.reader(topics, after, Some(app.live_behind_max));
+    let mut ping = tokio::time::interval(PING_EVERY);
+    loop {
+        match next(&mut reader, topics) {
+            Some(Step::Messages(messages)) => client.send(&messages).await?,
+            Some(Step::Lag { from_seq, to_seq, count }) => client.lag(from_seq, to_seq, count).await?,
+            None => tokio::select! {
+                there = reader.wait() => if !there { return client.close().await },
+                frame = incoming.next() => match frame {
+                    Some(Ok(Frame::Close(_)) | Err(_)) | None => return Ok(()),
+                    Some(Ok(_)) => {}
+                },
+                _ = ping.tick() => client.write([Frame::Ping(Bytes::new())]).await?,
+                () = app.closing.cancelled() => return client.close().await,
+            },
+        }
+    }
+}
+
+/// Raw samples come out of the station, which the writer may hold: other tasks must not wait with this one.
+fn next(reader: &mut Reader, topics: Topics) -> Option<Step> {
+    match topics.has(Topic::Raw) {
+        true => tokio::task::block_in_place(|| reader.next(AT_ONCE)),
+        false => reader.next(AT_ONCE),
+    }
+}
+
+impl Client<'_> {
+    async fn hello(&mut self, from: From, after: u64) -> Result<(), Gone> {
+        let from = match from {
+            From::Now => "now".into(),
+            From::Clock(clock) => format!("{}", clock.seconds()),
+            From::Seq(seq) => format!("seq:{seq}"),
+        };
+        let hello = serde_json::json!({
+            "seq": self.prev,
+            "prev": self.prev,
+            "type": "hello",
+            "mission": self.app.hub.mission(),
+            "spacecraft_id": self.app.hub.spacecraft_id(),
+            "frame": "orbiter_body",
+            "from": from,
+            "live_after_seq": after,
+            "topics": self.topics.iter().map(Topic::word).collect::<Vec<_>>(),
+        });
+        self.write([Frame::Text(hello.to_string().into())]).await
+    }
+
+    async fn lag(&mut self, from_seq: u64, to_seq: u64, missed: u64) -> Result<(), Gone> {
+        count(&self.app.board.counters.live_lagged, missed);
+        let prev = std::mem::replace(&mut self.prev, to_seq);
+        let text = format!(
+            r#"{{"seq":{to_seq},"prev":{prev},"type":"lag","from_seq":{from_seq},"to_seq":{to_seq},"count":{missed}}}"#
+        );
+        self.write([Frame::Text(text.into())]).await
+    }
+
+    async fn send(&mut self, messages: &[Arc<Message>]) -> Result<(), Gone> {
+        let app = self.app;
+        let prev = &mut self.prev;
+        let frames: Vec<Frame> = messages
+            .iter()
+            .map(|message| {
+                let text = whole_text(app, message, *prev);
+                *prev = message.seq;
+                Frame::Text(text)
+            })
+            .collect();
+        self.write(frames).await?;
+        count(&self.app.board.counters.live_delivered, messages.len() as u64);
+        Ok(())
+    }
+
+    /// Writes frames and flushes once.
+    async fn write(&mut self, frames: impl IntoIterator<Item = Frame>) -> Result<(), Gone> {
+        let written = tokio::time::timeout(WRITE_PATIENCE, async {
+            for frame in frames {
+                self.socket.feed(frame).await?;
+            }
+            self.socket.flush().await
+        });
+        match written.await {
+            Ok(Ok(())) => Ok(()),
+            _ => Err(Gone),
+        }
+    }
+
+    async fn close(&mut self) -> Result<(), Gone> {
+        let reason = CloseFrame { code: close_code::AWAY, reason: Utf8Bytes::from_static("the service is ending") };
+        self.write([Frame::Close(Some(reason))]).await
+    }
+}
+
+/// The text of a message for a reader; readers of the same topics share one.
+fn whole_text(app: &App, message: &Message, prev: u64) -> Utf8Bytes {
+    let members = || String::from_utf8_lossy(message_members(&app.mission, message));
+    let make = || format!(r#"{{"seq":{},"prev":{prev},{}}}"#, message.seq, members());
+    let (shared_prev, shared) = message.whole.get_or_init(|| (prev, Bytes::from(make())));
+    if *shared_prev != prev {
+        return make().into();
+    }
+    Utf8Bytes::try_from(shared.clone()).unwrap_or_default()
+}

@@ -1,0 +1,54 @@
+//! Times in queries: clock seconds or RFC 3339.
+
+use jiff::Timestamp;
+
+use super::problem::Problem;
+use crate::units::{Clock, MissionTime};
+
+/// Clocks beyond this are no times of a mission: a CUC time has 32 bits of seconds.
+const CLOCK_S_MAX: f64 = 4_294_967_296.0;
+
+/// Reads a time; which parameter it is of stands in the sentence when it is none.
+///
+/// # Errors
+/// A 400 problem naming the parameter and what was found.
+pub fn clock(mission: &MissionTime, name: &str, text: &str) -> Result<Clock, Problem> {
+    let clock_s = match text.parse::<f64>() {
+        Ok(clock_s) => clock_s,
+        Err(_) => match text.parse::<Timestamp>() {
+            Ok(utc) => mission.clock_s(utc),
+            Err(_) => {
+                let detail =
+                    format!("{name} is {text:?}; a time is clock seconds (13800.5) or RFC 3339 (1994-07-08T16:43:01Z)");
+                return Err(Problem::bad_request(detail));
+            }
+        },
+    };
+    if !clock_s.is_finite() || clock_s.abs() > CLOCK_S_MAX {
+        return Err(Problem::bad_request(format!("{name} is {text:?}, outside of the 32-bit instrument clock")));
+    }
+    Ok(Clock::from_seconds(clock_s))
+}
+
+/// As [`clock`], for a parameter that may be absent.
+///
+/// # Errors
+/// As [`clock`].
+pub fn optional_clock(mission: &MissionTime, name: &str, text: Option<&str>) -> Result<Option<Clock>, Problem> {
+    text.filter(|text| !text.is_empty()).map(|text| clock(mission, name, text)).transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_a_clock_or_an_instant() {
+        let mission = MissionTime::sts65();
+        assert_eq!(clock(&mission, "from", "13800.5").unwrap().tenths(), 138_005);
+        assert_eq!(clock(&mission, "from", "1994-07-08T16:43:01Z").unwrap().tenths(), 138_000);
+        for nonsense in ["soon", "NaN", "inf", "1e300", "1994-07-08"] {
+            assert!(clock(&mission, "from", nonsense).is_err(), "{nonsense}");
+        }
+    }
+}

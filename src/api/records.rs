@@ -1,0 +1,126 @@
+//! Calibration, gaps, playbacks, events, anomalies, diagnosis: what is asked now and then. The station answers, off the
+//! runtime's own threads, because the writer may hold it for as long as a batch takes.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Query, State};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use utoipa::{IntoParams, ToSchema};
+
+use super::App;
+use super::problem::Problem;
+use super::query::optional_clock;
+use crate::hub::wire::{AnomalyWire, EventWire, Gap};
+use crate::pipeline::Station;
+use crate::pipeline::files::{ledger_json, version_json};
+
+/// When it was known.
+#[derive(Debug, Clone, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub struct AsOf {
+    /// The answer that was known at this instrument clock: clock seconds or RFC 3339.
+    pub as_of: Option<String>,
+}
+
+/// Asks the station on a thread that may wait.
+async fn ask<T: Send + 'static>(app: &Arc<App>, question: impl FnOnce(&Station) -> T + Send + 'static) -> T {
+    let station = app.station.clone();
+    let asked = tokio::task::spawn_blocking(move || question(&station.read().expect("no holder panics")));
+    asked.await.expect("a question does not panic")
+}
+
+/// The calibration in use, or the one known at `as_of`.
+#[utoipa::path(get, path = "/calibration", tag = "calibration", params(AsOf),
+    responses((status = 200, description = "one version of the calibration", body = Object),
+        (status = 404, description = "none was known")))]
+pub async fn calibration(State(app): State<Arc<App>>, Query(query): Query<AsOf>) -> Result<Json<Value>, Problem> {
+    let as_of = optional_clock(&app.mission, "as_of", query.as_of.as_deref())?;
+    let found = ask(&app, move |station| match as_of {
+        None => station.calibration().map(version_json),
+        Some(clock) => station.derived().as_of(clock).map(version_json),
+    })
+    .await;
+    found.map(Json).ok_or_else(|| Problem::not_found("no calibration is known, or was known then"))
+}
+
+/// Every version of the calibration, in the order in which they became known.
+#[utoipa::path(get, path = "/calibration/history", tag = "calibration", params(AsOf),
+    responses((status = 200, description = "versions of the calibration", body = Object)))]
+pub async fn calibration_history(
+    State(app): State<Arc<App>>,
+    Query(query): Query<AsOf>,
+) -> Result<Json<Value>, Problem> {
+    let as_of = optional_clock(&app.mission, "as_of", query.as_of.as_deref())?;
+    let versions = ask(&app, move |station| {
+        let known =
+            station.derived().timeline.iter().filter(|version| as_of.is_none_or(|at| version.known_since <= at));
+        known.map(version_json).collect::<Vec<_>>()
+    })
+    .await;
+    Ok(Json(json!({ "versions": versions })))
+}
+
+/// A list of gaps.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct Gaps {
+    /// Distinct seconds with a science record.
+    pub seconds_covered: u64,
+    /// In order of time.
+    pub gaps: Vec<Gap>,
+}
+
+/// Spans between the first and the last second received that are not covered.
+#[utoipa::path(get, path = "/gaps", tag = "telemetry", responses((status = 200, body = Gaps)))]
+pub async fn gaps(State(app): State<Arc<App>>) -> Json<Gaps> {
+    let picture = app.board.picture();
+    let gaps = picture.gaps.iter().map(|(from, to)| Gap::new(&app.mission, *from, *to)).collect();
+    Json(Gaps { seconds_covered: picture.seconds_covered, gaps })
+}
+
+/// The ledger: every bit, frame and packet accounted for, in total and by playback.
+#[utoipa::path(get, path = "/playbacks", tag = "telemetry",
+    responses((status = 200, description = "as ledger.json, each playback with the span it covers", body = Object)))]
+pub async fn playbacks(State(app): State<Arc<App>>) -> Json<Value> {
+    let ledger = ask(&app, |station| {
+        let mut ledger = ledger_json(station);
+        let accounts = station.ledger().playbacks();
+        if let Some(list) = ledger.get_mut("playbacks").and_then(Value::as_array_mut) {
+            for (entry, (id, account)) in list.iter_mut().zip(accounts) {
+                entry["playback"] = json!(id.0);
+                entry["open"] = json!(!account.closed);
+                entry["from_clock_s"] = json!(account.seconds.spans().next().map(|(from, _)| from as f64));
+                entry["to_clock_s"] = json!(account.seconds.spans().last().map(|(_, to)| to as f64));
+            }
+        }
+        ledger
+    });
+    Json(ledger.await)
+}
+
+/// Events of the instrument, in order.
+#[utoipa::path(get, path = "/events", tag = "telemetry", responses((status = 200, body = [EventWire])))]
+pub async fn events(State(app): State<Arc<App>>) -> Json<Vec<EventWire>> {
+    let mission = app.mission;
+    Json(ask(&app, move |station| station.events().map(|event| EventWire::new(&mission, event)).collect()).await)
+}
+
+/// What the ground found odd, in order of time.
+#[utoipa::path(get, path = "/anomalies", tag = "telemetry", responses((status = 200, body = [AnomalyWire])))]
+pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
+    Json(ask(&app, |station| station.derived().anomalies.iter().map(AnomalyWire::new).collect()).await)
+}
+
+/// The last diagnosis put into the data directory as `diagnosis.json`.
+#[utoipa::path(get, path = "/diagnosis", tag = "diagnosis",
+    responses((status = 200, description = "diagnosis.json", body = Object), (status = 404, description = "there is none")))]
+pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Json<Value>, Problem> {
+    let path = app.data_dir.join("diagnosis.json");
+    let text = tokio::fs::read(&path).await.map_err(|_| {
+        Problem::not_found("there is no diagnosis: `oare diagnose CASE_DIR --out DATA/diagnosis.json` puts one here")
+    })?;
+    serde_json::from_slice(&text)
+        .map(Json)
+        .map_err(|error| Problem::not_found(format!("diagnosis.json in the data directory is no JSON: {error}")))
+}

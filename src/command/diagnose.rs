@@ -1,0 +1,207 @@
+//! `oare diagnose CASE_DIR`: what did the simulation leave out?
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context;
+use indicatif::{ProgressBar, ProgressStyle};
+use oare_ground::diagnose::analysis::{Analysis, Prepared, Settings};
+use oare_ground::diagnose::answer::{Diagnosis, Verdict};
+use oare_ground::diagnose::case::{Case, Header, Texts};
+use oare_ground::diagnose::error::CaseError;
+use oare_ground::diagnose::measured::{self, MeasuredCase};
+use oare_ground::diagnose::report;
+use rayon::prelude::*;
+
+/// Says what physics a simulation left out, from a case directory.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Directory with `case.toml` and the files it names.
+    case: PathBuf,
+    /// Where `diagnosis.json` goes; the case directory is never written to.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Directory for the report: `index.html` and its figures.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Print the answer as JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+    /// Override a key of `case.toml`, for example `vehicle.mass_kg=104500`.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Seed of the bootstrap.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Bootstrap replicates for the false-alarm probability; 0 takes the table of nulls.
+    #[arg(long, default_value_t = 0)]
+    bootstraps: usize,
+    /// Catalogue effects to leave out.
+    #[arg(long, value_delimiter = ',')]
+    without: Vec<String>,
+    /// False-alarm probability at or below which something is claimed.
+    #[arg(long, default_value_t = 0.002)]
+    claim_probability: f64,
+}
+
+/// Orbits, series and poses: recordings of another kind, the same answer in their own unit.
+fn measured(args: &Args) -> anyhow::Result<ExitCode> {
+    let read = oare_ground::challenge::real::read(&args.case, &args.set).map_err(anyhow::Error::from);
+    let answer = match read.and_then(|(case, files)| Ok(measured::diagnose(&case, &files)?)) {
+        Ok(answer) => answer,
+        Err(error) => {
+            eprintln!("oare: {error:#}");
+            return Ok(super::unusable());
+        }
+    };
+    let json = serde_json::to_string_pretty(&answer).context("the answer does not serialise")?;
+    if let Some(out) = &args.out {
+        write(out, &json)?;
+    }
+    if let Some(directory) = &args.report {
+        write(&directory.join("diagnosis.json"), &json)?;
+    }
+    if args.json {
+        println!("{json}");
+        return Ok(super::DONE);
+    }
+    println!("{}: {:?}", answer.case, answer.verdict);
+    for effect in &answer.effects {
+        println!("  {}: {}", effect.id, effect.why);
+        for p in &effect.parameters {
+            println!("    {} = {:.4e} +- {:.1e} {}", p.name, p.value, p.sigma, p.unit);
+        }
+    }
+    for note in &answer.notes {
+        println!("  {note}");
+    }
+    Ok(super::DONE)
+}
+
+/// Runs it.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let text = std::fs::read_to_string(args.case.join("case.toml")).unwrap_or_default();
+    if MeasuredCase::kind_of(&text).is_some() {
+        return measured(&args);
+    }
+    let analysis = match analyse(&args) {
+        Ok(analysis) => analysis,
+        Err(error) => {
+            eprintln!("oare: {error}");
+            return Ok(super::unusable());
+        }
+    };
+    let json = serde_json::to_string_pretty(&analysis.diagnosis).context("the answer does not serialise")?;
+    if let Some(out) = &args.out {
+        write(out, &json)?;
+    }
+    if let Some(directory) = &args.report {
+        let drawn = report::report(&analysis.diagnosis, &analysis.plates);
+        write(&directory.join("index.html"), &drawn.html)?;
+        write(&directory.join("diagnosis.json"), &json)?;
+        for (name, svg) in &drawn.figures {
+            write(&directory.join(name), svg)?;
+        }
+    }
+    if args.json {
+        println!("{json}");
+    } else {
+        print_table(&analysis.diagnosis);
+    }
+    Ok(super::DONE)
+}
+
+fn analyse(args: &Args) -> Result<Analysis, CaseError> {
+    let case = read_case(&args.case, &args.set)?;
+    let settings = Settings {
+        seed: args.seed,
+        bootstraps: args.bootstraps,
+        without: args.without.clone(),
+        claim_probability: args.claim_probability,
+    };
+    let prepared = Prepared::new(&case, &settings)?;
+    let bar = ProgressBar::new(args.bootstraps as u64);
+    if let Ok(style) = ProgressStyle::with_template("bootstrap {bar:40} {pos}/{len} {elapsed} (left {eta})") {
+        bar.set_style(style);
+    }
+    let replicates: Vec<f64> = (0..args.bootstraps)
+        .into_par_iter()
+        .map(|i| {
+            let statistic = prepared.replicate(i);
+            bar.inc(1);
+            statistic
+        })
+        .collect();
+    bar.finish_and_clear();
+    Ok(prepared.conclude(&replicates))
+}
+
+/// Reads a case directory.
+///
+/// # Errors
+/// [`CaseError`] with one sentence that names the file and the value.
+pub fn read_case(directory: &Path, set: &[String]) -> Result<Case, CaseError> {
+    let text = |name: &str| std::fs::read_to_string(directory.join(name)).ok();
+    let toml = text("case.toml")
+        .ok_or_else(|| CaseError::MissingFile { file: directory.join("case.toml").display().to_string() })?;
+    let header = Header::parse(&toml, set)?;
+    if header.kind != "acceleration_csv" {
+        return Err(CaseError::Kind(header.kind));
+    }
+    let named = |name: &str| if name.is_empty() { None } else { text(name) };
+    let texts = Texts {
+        recording: named(&header.files.recording),
+        simulation: named(&header.files.simulation),
+        ancillary: named(&header.files.ancillary),
+        events: named(&header.files.events),
+    };
+    Case::from_texts(header, &texts)
+}
+
+fn write(path: &Path, text: &str) -> anyhow::Result<()> {
+    if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
+        std::fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
+    }
+    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+}
+
+fn print_table(diagnosis: &Diagnosis) {
+    let verdict = match diagnosis.verdict {
+        Verdict::Consistent => "consistent",
+        Verdict::Explained => "explained",
+        Verdict::Ambiguous => "ambiguous",
+        Verdict::Unexplained => "unexplained",
+    };
+    println!("{}: {verdict} (false-alarm probability {:.1e})", diagnosis.case, diagnosis.false_alarm_probability);
+    for effect in &diagnosis.effects {
+        println!("  {:<28} posterior {:.3}", effect.id, effect.posterior);
+        if let Some(axis) = &effect.axis {
+            println!("      {:<18} {axis}", "axis");
+        }
+        for p in &effect.parameters {
+            println!("      {:<18} {:>14.6} +- {:.6} {}", p.name, p.value, p.sigma, p.unit);
+        }
+    }
+    if let Some(h) = &diagnosis.hypothesis {
+        println!("  hypothesis: {} on {} ({})", h.formula, h.axis, h.location);
+    }
+    for set in &diagnosis.cannot_tell_apart {
+        println!("  cannot tell apart: {}", set.join(" + "));
+    }
+    for a in &diagnosis.alternatives {
+        println!("  alternative: {} (posterior {:.3})", a.effects.join(" + "), a.posterior);
+    }
+    if let Some(fit) = &diagnosis.fit {
+        println!(
+            "  rms before {:.1?} ng, after {:.1?} ng, noise floor {:.1?} ng",
+            fit.before.rms_ng, fit.after.rms_ng, fit.noise_floor_ng
+        );
+        println!(
+            "  held out: log score gain {:.1} +- {:.1}, excess removed {:.3}",
+            fit.held_out.log_score_gain, fit.held_out.log_score_gain_se, fit.held_out.excess_removed
+        );
+    }
+    for note in &diagnosis.notes {
+        println!("  note: {note}");
+    }
+}

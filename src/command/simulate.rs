@@ -1,0 +1,96 @@
+//! `oare simulate`: a mission flown, its dump and its truth written.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context as _;
+
+use oare_ground::ingest::wire::LinkConfig;
+use oare_ground::simulate::mission_file::{Overrides, from_toml};
+use oare_ground::simulate::recorder::{Framer, Packetiser};
+use oare_ground::simulate::truth::{TruthBuilder, instrument_json, truth_csv};
+use oare_ground::simulate::{Mission, SimulateError, playbacks};
+
+/// Fly a simulated mission and write its recorder dump, with the truth beside it.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Dump to write; several playbacks stand in it one after the other. The true instrument goes beside it as
+    /// `.instrument.json`, true accelerations as `.truth.csv`.
+    #[arg(long)]
+    out: PathBuf,
+    /// Mission file; without it, STS-65 as it was (config/mission.toml explains every key).
+    #[arg(long)]
+    config: Option<PathBuf>,
+    /// Length of the mission in hours, in place of the file's.
+    #[arg(long)]
+    hours: Option<f64>,
+    /// Seed, in place of the file's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Where to write the true accelerations, in place of beside the dump.
+    #[arg(long)]
+    truth: Option<PathBuf>,
+}
+
+/// Flies the mission.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let text = match &args.config {
+        Some(path) => fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?,
+        None => String::new(),
+    };
+    let overrides = Overrides { seed: args.seed, hours: args.hours };
+    let file = match from_toml(&text, overrides) {
+        Ok(file) => file,
+        Err(problems) => return Ok(refuse(&problems)),
+    };
+    let mission = match Mission::new(file.mission) {
+        Ok(mission) => mission,
+        Err(problems) => return Ok(refuse(&problems)),
+    };
+
+    let bar = indicatif::ProgressBar::new(u64::from(mission.config().end_clock_s() - mission.config().start_clock_s));
+    let link = LinkConfig::default();
+    let (mut packetiser, mut framer, mut truth) =
+        (Packetiser::default(), Framer::new(link, 1, 0), TruthBuilder::default());
+    let (mut frames, mut windows, mut seconds) = (Vec::new(), Vec::new(), 0u64);
+    for second in mission.fly() {
+        for sent in &second.sent {
+            framer.push(&packetiser.packet(sent), |frame| frames.push(frame));
+        }
+        windows.extend(truth.take(&second));
+        seconds += 1;
+        if seconds.is_multiple_of(3600) {
+            bar.set_position(seconds);
+        }
+    }
+    framer.finish(|frame| frames.push(frame));
+    bar.finish_and_clear();
+
+    let passes = playbacks(&frames, &link, &file.recorder, mission.config().seed);
+    let octets: Vec<u8> = passes.iter().flat_map(|pass| pass.octets.iter().copied()).collect();
+    write(&args.out, &octets)?;
+    let truth_path = args.truth.unwrap_or_else(|| args.out.with_extension("truth.csv"));
+    write(&truth_path, truth_csv(&windows).as_bytes())?;
+    write(&args.out.with_extension("instrument.json"), instrument_json(&mission).as_bytes())?;
+    println!(
+        "{seconds} seconds in {} frames and {} playback(s): {} octets in {}, truth in {}",
+        frames.len(),
+        passes.len(),
+        octets.len(),
+        args.out.display(),
+        truth_path.display()
+    );
+    Ok(super::DONE)
+}
+
+fn refuse(problems: &[SimulateError]) -> ExitCode {
+    for problem in problems {
+        eprintln!("{problem}");
+    }
+    super::unusable()
+}
+
+fn write(path: &Path, octets: &[u8]) -> anyhow::Result<()> {
+    fs::write(path, octets).with_context(|| format!("cannot write {}", path.display()))
+}

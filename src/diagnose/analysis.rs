@@ -1,0 +1,175 @@
+//! The analysis of a case from end to end: scene, search, false-alarm probability, verdict, answer.
+//!
+//! Deterministic: the seed serves the bootstrap alone. Not here: files, threads; bootstrap replicates can be run one by one
+//! by whoever has threads, with [`Prepared::replicate`].
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::answer::Diagnosis;
+use super::case::Case;
+use super::error::CaseError;
+use super::noise::{self, AxisNoise};
+use super::null_table;
+use super::report::{CovariatePlate, Plates};
+use super::scene::{Axes, Scene};
+use super::solve::{Library, Solution, solve};
+use super::verdict;
+
+/// How to analyse.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Seed of the bootstrap.
+    pub seed: u64,
+    /// Bootstrap replicates; 0 takes the table of nulls.
+    pub bootstraps: usize,
+    /// Catalogue effects to leave out.
+    pub without: Vec<String>,
+    /// False-alarm probability at or below which something is claimed.
+    pub claim_probability: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { seed: 1, bootstraps: 0, without: Vec::new(), claim_probability: 0.002 }
+    }
+}
+
+/// The answer, and what its figures show.
+#[derive(Debug, Clone)]
+pub struct Analysis {
+    /// The answer.
+    pub diagnosis: Diagnosis,
+    /// The figures' numbers.
+    pub plates: Plates,
+}
+
+/// Analyse a case.
+///
+/// # Errors
+/// [`CaseError`] where the numbers defeat the physics or the estimation.
+pub fn analyse(case: &Case, settings: &Settings) -> Result<Analysis, CaseError> {
+    let prepared = Prepared::new(case, settings)?;
+    let replicates = (0..settings.bootstraps).map(|i| prepared.replicate(i)).collect::<Vec<f64>>();
+    Ok(prepared.conclude(&replicates))
+}
+
+/// The answer alone.
+///
+/// # Errors
+/// As [`analyse`].
+pub fn diagnose(case: &Case, settings: &Settings) -> Result<Diagnosis, CaseError> {
+    analyse(case, settings).map(|a| a.diagnosis)
+}
+
+/// A case searched, before the verdict.
+pub struct Prepared<'a> {
+    scene: Scene<'a>,
+    library: Library,
+    solution: Solution,
+    settings: Settings,
+}
+
+impl<'a> Prepared<'a> {
+    /// Furnish and search.
+    ///
+    /// # Errors
+    /// As [`analyse`].
+    pub fn new(case: &'a Case, settings: &Settings) -> Result<Self, CaseError> {
+        let scene = Scene::new(case)?;
+        let library = Library::new(&scene, &settings.without);
+        let solution = solve(&scene, &library, None);
+        Ok(Self { scene, library, solution, settings: settings.clone() })
+    }
+
+    /// The statistic of replicate `index`: a record of the fitted noise alone through the whole search, the noise fitted anew.
+    pub fn replicate(&self, index: usize) -> f64 {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(
+            self.settings.seed.wrapping_mul(1_000_003).wrapping_add(index as u64),
+        );
+        let noise = self.null_noise();
+        let residual: Axes = std::array::from_fn(|k| {
+            noise::simulate(&noise[k], &self.scene.schedule, &self.scene.activity[k], || {
+                StandardNormal.sample(&mut rng)
+            })
+        });
+        let scene = self.scene.with_residual(residual);
+        solve(&scene, &self.library, Some(&noise)).statistic()
+    }
+
+    /// Noise under which the bootstrap is made: that of the best hypothesis, for its residual holds no effect, unless it is larger
+    /// than the null's own.
+    fn null_noise(&self) -> [AxisNoise; 3] {
+        let best = self
+            .solution
+            .listed
+            .iter()
+            .chain(&self.solution.open)
+            .max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior));
+        match best {
+            Some(best) if best.log_posterior > self.solution.null.log_posterior => best.noise,
+            _ => self.solution.null.noise,
+        }
+    }
+
+    /// False-alarm probability and verdict; `replicates` are statistics of bootstrap replicates, empty for the table.
+    pub fn conclude(&self, replicates: &[f64]) -> Analysis {
+        let statistic = self.solution.statistic();
+        let table = null_table::false_alarm_probability(statistic);
+        let probability = if replicates.is_empty() {
+            table
+        } else {
+            let reached = replicates.iter().filter(|r| **r >= statistic).count();
+            (reached + 1) as f64 / (replicates.len() + 1) as f64
+        };
+        // Few replicates cannot show a small probability: then the table decides, and the bootstrap may only forbid.
+        let enough = (replicates.len() + 1) as f64 * self.settings.claim_probability >= 1.0;
+        let decisive = if enough || probability > 3.0 / (replicates.len() + 1) as f64 { probability } else { table };
+        let (diagnosis, model_ng, ladder) =
+            verdict::conclude(&self.scene, &self.library, &self.solution, decisive, self.settings.claim_probability);
+        Analysis { plates: plates(&self.scene, model_ng, ladder), diagnosis }
+    }
+}
+
+fn plates(scene: &Scene, model_ng: Axes, ladder: Vec<(String, f64)>) -> Plates {
+    let centred = |series: &[f64]| {
+        let mean = series.iter().sum::<f64>() / series.len() as f64;
+        series.iter().map(|x| x - mean).collect::<Vec<f64>>()
+    };
+    let plate =
+        |name: &str, unit: &str, values: Vec<f64>| CovariatePlate { name: name.into(), unit: unit.into(), values };
+    let degrees = |x: f64| x.to_degrees();
+    let covariates = vec![
+        plate(
+            "argument of latitude",
+            "deg",
+            at_windows(scene, |g| {
+                let state = crate::physics::orbit::State { r_m: scene.r_m[g], v_m_s: scene.v_m_s[g] };
+                degrees(crate::physics::orbit::argument_of_latitude_rad(&state))
+            }),
+        ),
+        plate(
+            "Sun zenith angle",
+            "deg",
+            at_windows(scene, |g| degrees(scene.sun[g].dot(&scene.r_m[g].normalize()).clamp(-1.0, 1.0).acos())),
+        ),
+        plate("sensor temperature", "C", at_windows(scene, |g| scene.temperature_c[g])),
+        plate("modelled drag", "ng", at_windows(scene, |g| scene.drag_ng[g].norm())),
+    ];
+    Plates {
+        clock_s: scene.clock_s().to_vec(),
+        liftoff_clock_s: scene.case.header.liftoff_clock_s,
+        before_ng: std::array::from_fn(|k| centred(&scene.residual_ng[k])),
+        model_ng: std::array::from_fn(|k| centred(&model_ng[k])),
+        sunlit: at_windows(scene, |g| scene.sunlit[g]),
+        events: scene.case.events.iter().map(|e| (e.clock_s, e.clock_s + e.duration_s, e.kind.clone())).collect(),
+        covariates,
+        period_s: scene.period_s,
+        ladder,
+    }
+}
+
+fn at_windows(scene: &Scene, on_grid: impl Fn(usize) -> f64) -> Vec<f64> {
+    let nearest = |t: &f64| scene.grid_s.partition_point(|g| g < t).min(scene.grid_s.len() - 1);
+    scene.clock_s().iter().map(|t| on_grid(nearest(t))).collect()
+}

@@ -1,0 +1,24 @@
+//! Drag off by a fraction: drag coefficient, area or density wrong by a factor, or the whole term absent.
+
+use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "aerodynamic_drag",
+    name: "Aerodynamic drag off by a fraction",
+    equation: "fraction x a_d, a_d = -1/2 rho Cd A |v| v / m, v relative to co-rotating air",
+    source: "density models are 15-20 % off, 50-70 % in storms",
+    mistaken_for: &["scale_factor of the ram axis", "a bias in a fixed attitude", "atmosphere_corotation"],
+    linear: &[Linear { name: "fraction", unit: "1", size: 0.5, size_max: 3.0 }],
+    nonlinear: &[],
+    log_prior: COMMON,
+    grid: one_point,
+    log_volume: no_volume,
+    signature: signature,
+    why: "The residual points against the velocity in every attitude and scales with the modelled drag.",
+};
+
+fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
+    Some(Shape::Columns(vec![full(scene.measure(|i| scene.drag_ng[i]))]))
+}

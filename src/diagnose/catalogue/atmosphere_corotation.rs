@@ -1,0 +1,25 @@
+//! The atmosphere turns with the Earth: drag with co-rotation less drag without.
+
+use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use crate::diagnose::scene::Scene;
+use crate::physics::Vec3;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "atmosphere_corotation",
+    name: "Co-rotation of the atmosphere",
+    equation: "fraction x (a_d(v - w_e x r) - a_d(v))",
+    source: "standard; 5-30 ng cross-track",
+    mistaken_for: &["thermospheric_wind", "a yaw misalignment", "aerodynamic_drag"],
+    linear: &[Linear { name: "fraction", unit: "1", size: 0.7, size_max: 2.0 }],
+    nonlinear: &[],
+    log_prior: COMMON,
+    grid: one_point,
+    log_volume: no_volume,
+    signature: signature,
+    why: "The residual has the cross-track part that a turning atmosphere gives, changing sign between ascending and descending passes, with a small loss of drag along the track.",
+};
+
+fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
+    Some(Shape::Columns(vec![full(scene.measure(|i| scene.drag_ng[i] - scene.drag_with(i, 0.0, &Vec3::zeros())))]))
+}

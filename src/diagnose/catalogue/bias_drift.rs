@@ -1,0 +1,39 @@
+//! The bias decays exponentially; amplitudes refer to the first instant of the simulation.
+
+use super::{COMMON, Effect, Nonlinear, Shape, Theta, push};
+use crate::diagnose::measure::decay;
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "bias_drift",
+    name: "Bias drifts",
+    equation: "a exp(-(t - t0)/tau), t0 the first instant of the simulation",
+    source: "bias law of the flight report: time constants of 6 to 500 h",
+    mistaken_for: &["vent_leak", "temperature_bias", "a trend of density"],
+    linear: &push(150.0, 20000.0),
+    nonlinear: &[Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.2, range: [7.6, 13.5] }],
+    log_prior: COMMON,
+    grid: grid,
+    log_volume: log_volume,
+    signature: signature,
+    why: "The bias of each sensor axis relaxes from the beginning of the record with one time constant, whatever the attitude does.",
+};
+
+/// Shortest and longest time constant, s.
+const TAU_RANGE_S: [f64; 2] = [3000.0, 500_000.0];
+
+fn grid(_: &Scene) -> Vec<Theta> {
+    [4000.0_f64, 7000.0, 12_000.0, 20_000.0, 35_000.0, 60_000.0, 120_000.0, 300_000.0]
+        .map(|tau| [tau.ln(), 0.0])
+        .to_vec()
+}
+
+fn log_volume(_: &Scene) -> f64 {
+    (TAU_RANGE_S[1] / TAU_RANGE_S[0]).ln().ln()
+}
+
+fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
+    let inside = theta[0] > TAU_RANGE_S[0].ln() && theta[0] < TAU_RANGE_S[1].ln();
+    inside.then(|| Shape::Scalar(decay(scene.clock_s(), scene.case.simulation.clock_s[0], theta[0].exp())))
+}

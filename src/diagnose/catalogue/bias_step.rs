@@ -1,0 +1,42 @@
+//! The bias steps at an instant and stays.
+
+use super::{COMMON, Effect, Nonlinear, Shape, Theta, onsets, push};
+use crate::diagnose::measure::decay;
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "bias_step",
+    name: "Bias step",
+    equation: "a after the onset",
+    source: "electronic bias shifts were seen between calibrations",
+    mistaken_for: &["vent_leak", "a trend of density"],
+    linear: &push(60.0, 2000.0),
+    nonlinear: &[Nonlinear {
+        name: "onset_s",
+        unit: "s",
+        log: false,
+        step: 300.0,
+        range: [f64::NEG_INFINITY, f64::INFINITY],
+    }],
+    log_prior: COMMON,
+    grid: grid,
+    log_volume: log_volume,
+    signature: signature,
+    why: "Each sensor axis jumps once, at one instant, and stays there whatever the attitude does.",
+};
+
+fn grid(scene: &Scene) -> Vec<Theta> {
+    onsets(scene, 900.0, 900.0).into_iter().map(|t| [t, 0.0]).collect()
+}
+
+fn log_volume(scene: &Scene) -> f64 {
+    let [start, end] = scene.span_s();
+    (end - start).ln()
+}
+
+fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
+    let [start, end] = scene.span_s();
+    (theta[0] > start + 300.0 && theta[0] < end - 300.0)
+        .then(|| Shape::Scalar(decay(scene.clock_s(), theta[0], f64::INFINITY)))
+}

@@ -1,0 +1,31 @@
+//! The sensor is elsewhere than assumed: a = T dr, T = -G + [w x][w x] + [dw/dt x].
+
+use crate::units::NANO_G_M_S2;
+
+use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "cg_offset",
+    name: "Sensor offset from the centre of gravity differs",
+    equation: "a = T dr, T = -G + [w x][w x] + [dw/dt x]",
+    source: "standard mechanics; 409 ng per metre radial, 136 cross-track in LVLH at 300 km",
+    mistaken_for: &["a bias in a single LVLH attitude", "mass_shift", "rotation"],
+    linear: &[
+        Linear { name: "dx_m", unit: "m", size: 0.6, size_max: 3.0 },
+        Linear { name: "dy_m", unit: "m", size: 0.6, size_max: 3.0 },
+        Linear { name: "dz_m", unit: "m", size: 0.6, size_max: 3.0 },
+    ],
+    nonlinear: &[],
+    log_prior: COMMON,
+    grid: one_point,
+    log_volume: no_volume,
+    signature: signature,
+    why: "The residual is linear in the gravity-gradient and rotation tensor: it changes with every attitude as a displaced sensor must, and a bias cannot.",
+};
+
+fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
+    let column = |axis: usize| full(scene.measure(|i| scene.tensor_s2(i).column(axis) / NANO_G_M_S2));
+    Some(Shape::Columns((0..3).map(column).collect()))
+}

@@ -1,0 +1,24 @@
+//! A shift between sleep and wake, wake minus sleep.
+
+use super::{COMMON, Effect, Shape, logged, no_volume, one_point, push};
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "crew_activity",
+    name: "Crew activity shifts the mean",
+    equation: "a x (1 while the crew is awake)",
+    source: "1-20 ng; 16 h on, 8 h off",
+    mistaken_for: &["a daily temperature cycle"],
+    linear: &push(20.0, 500.0),
+    nonlinear: &[],
+    log_prior: COMMON,
+    grid: one_point,
+    log_volume: no_volume,
+    signature: signature,
+    why: "The residual shifts at the logged ends of the sleep periods and nowhere else.",
+};
+
+fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
+    logged(scene, "crew_sleep").map(|asleep| Shape::Scalar(asleep.iter().map(|s| 1.0 - s).collect()))
+}

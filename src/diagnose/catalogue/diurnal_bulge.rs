@@ -1,0 +1,25 @@
+//! Day-night variation of density: a_d cos psi, psi from the apex 30 degrees east of the Sun.
+
+use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use crate::diagnose::scene::Scene;
+use crate::physics::bulge;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "diurnal_bulge",
+    name: "Day-night bulge of the atmosphere",
+    equation: "a_d x amplitude x cos psi",
+    source: "density bulge near 14 h local time; 30-50 % of drag",
+    mistaken_for: &["solar_radiation_pressure", "temperature_bias"],
+    linear: &[Linear { name: "amplitude", unit: "1", size: 0.4, size_max: 2.0 }],
+    nonlinear: &[],
+    log_prior: COMMON,
+    grid: one_point,
+    log_volume: no_volume,
+    signature: signature,
+    why: "The residual lies along the drag, once per orbit, strongest when the vehicle passes the afternoon side: it follows the Sun and not the perigee.",
+};
+
+fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
+    Some(Shape::Columns(vec![full(scene.measure(|i| scene.drag_ng[i] * bulge::cos_psi(&scene.r_m[i], &scene.sun[i])))]))
+}

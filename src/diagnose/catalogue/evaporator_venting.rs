@@ -1,0 +1,24 @@
+//! A push while a logged event of kind `evaporator` lasts.
+
+use super::{COMMON, Effect, Shape, logged, no_volume, one_point, push};
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "evaporator_venting",
+    name: "Evaporator venting",
+    equation: "a x (share of the window inside logged events)",
+    source: "flash evaporator: 5-15 min cycles of 50-150 ng",
+    mistaken_for: &["nearly nothing"],
+    linear: &push(60.0, 1000.0),
+    nonlinear: &[],
+    log_prior: COMMON,
+    grid: one_point,
+    log_volume: no_volume,
+    signature: signature,
+    why: "The residual is a push fixed in the body that begins and ends with the logged cycles of the evaporator.",
+};
+
+fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
+    logged(scene, "evaporator").map(Shape::Scalar)
+}

@@ -1,0 +1,27 @@
+//! Gravity gradient left out of the simulation: -G r at the sensor, G = (mu/R^3)(3 e e^T - I).
+
+use crate::units::NANO_G_M_S2;
+
+use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "gravity_gradient",
+    name: "Gravity gradient left out",
+    equation: "-G r, r the assumed offset of the sensor",
+    source: "standard mechanics; 409 ng per metre radial at 300 km",
+    mistaken_for: &["cg_offset"],
+    linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0 }],
+    nonlinear: &[],
+    log_prior: COMMON,
+    grid: one_point,
+    log_volume: no_volume,
+    signature: signature,
+    why: "The residual is the gravity gradient at the assumed sensor position: it turns with the local vertical in body axes and follows every attitude change.",
+};
+
+fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
+    let offset = scene.vehicle.sensor_offset_m;
+    Some(Shape::Columns(vec![full(scene.measure(|i| scene.gradient_s2(i) * offset * (-1.0 / NANO_G_M_S2)))]))
+}

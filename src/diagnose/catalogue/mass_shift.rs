@@ -1,0 +1,61 @@
+//! The centre of gravity steps at a logged change of mass: a = T dr after the event, in the pattern of T only.
+
+use crate::units::NANO_G_M_S2;
+
+use super::{COMMON, Effect, Linear, Nonlinear, Shape, Theta};
+use crate::diagnose::design::Raw;
+use crate::diagnose::measure::decay;
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "mass_shift",
+    name: "Centre of gravity steps at a mass change",
+    equation: "a = T dr after the event",
+    source: "standard mechanics; 40-400 ng",
+    mistaken_for: &["bias_step", "cg_offset"],
+    linear: &[
+        Linear { name: "dx_m", unit: "m", size: 0.4, size_max: 3.0 },
+        Linear { name: "dy_m", unit: "m", size: 0.4, size_max: 3.0 },
+        Linear { name: "dz_m", unit: "m", size: 0.4, size_max: 3.0 },
+    ],
+    nonlinear: &[Nonlinear {
+        name: "onset_s",
+        unit: "s",
+        log: false,
+        step: 0.0,
+        range: [f64::NEG_INFINITY, f64::INFINITY],
+    }],
+    log_prior: COMMON,
+    grid: grid,
+    log_volume: log_volume,
+    signature: signature,
+    why: "The residual begins at a logged change of mass and follows the gravity-gradient and rotation tensor from there on: the centre of gravity moved.",
+};
+
+fn grid(scene: &Scene) -> Vec<Theta> {
+    let [start, end] = scene.span_s();
+    let inside = |t: &f64| *t > start + 600.0 && *t < end - 600.0;
+    scene
+        .case
+        .events
+        .iter()
+        .filter(|e| e.kind == "mass_change")
+        .map(|e| e.clock_s)
+        .filter(inside)
+        .map(|t| [t, 0.0])
+        .collect()
+}
+
+fn log_volume(scene: &Scene) -> f64 {
+    (grid(scene).len().max(1) as f64).ln()
+}
+
+fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
+    let after = decay(scene.clock_s(), theta[0], f64::INFINITY);
+    let column = |axis: usize| -> Raw {
+        let measured = scene.measure(|i| scene.tensor_s2(i).column(axis) / NANO_G_M_S2);
+        measured.map(|series| Some(series.iter().zip(&after).map(|(a, s)| a * s).collect()))
+    };
+    Some(Shape::Columns((0..3).map(column).collect()))
+}

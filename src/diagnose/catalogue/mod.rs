@@ -1,0 +1,183 @@
+//! The catalogue: one file an effect, one flat list.
+//!
+//! An effect says what series the recording has and the simulation lacks, as linear columns (with the size each
+//! coefficient may have) at given values of its nonlinear parameters. It searches nothing.
+
+use super::design::Raw;
+use super::scene::{Axes, Scene};
+
+pub mod aerodynamic_drag;
+pub mod atmosphere_corotation;
+pub mod bias_drift;
+pub mod bias_step;
+pub mod cg_offset;
+pub mod crew_activity;
+pub mod diurnal_bulge;
+pub mod evaporator_venting;
+pub mod gravity_gradient;
+pub mod magnetic_sensitivity;
+pub mod mass_shift;
+pub mod misalignment;
+pub mod rotation;
+pub mod scale_factor;
+pub mod solar_radiation_pressure;
+pub mod temperature_bias;
+pub mod thermospheric_wind;
+pub mod thruster_residual;
+pub mod time_offset;
+pub mod vent_leak;
+pub mod water_dump;
+
+/// Every effect a record of accelerations can be searched for.
+pub const ALL: &[&Effect] = &[
+    &gravity_gradient::EFFECT,
+    &rotation::EFFECT,
+    &cg_offset::EFFECT,
+    &mass_shift::EFFECT,
+    &aerodynamic_drag::EFFECT,
+    &diurnal_bulge::EFFECT,
+    &atmosphere_corotation::EFFECT,
+    &thermospheric_wind::EFFECT,
+    &solar_radiation_pressure::EFFECT,
+    &vent_leak::EFFECT,
+    &water_dump::EFFECT,
+    &evaporator_venting::EFFECT,
+    &thruster_residual::EFFECT,
+    &crew_activity::EFFECT,
+    &magnetic_sensitivity::EFFECT,
+    &scale_factor::EFFECT,
+    &misalignment::EFFECT,
+    &temperature_bias::EFFECT,
+    &bias_drift::EFFECT,
+    &bias_step::EFFECT,
+    &time_offset::EFFECT,
+];
+
+/// The effect of an id.
+pub fn by_id(id: &str) -> Option<&'static Effect> {
+    ALL.iter().find(|e| e.id == id).copied()
+}
+
+/// Nonlinear parameters of an effect, in its own coordinates.
+pub type Theta = [f64; 2];
+
+/// One entry.
+pub struct Effect {
+    /// Fixed id.
+    pub id: &'static str,
+    /// Name for people.
+    pub name: &'static str,
+    /// The equation, in the letters of the field.
+    pub equation: &'static str,
+    /// Where it comes from.
+    pub source: &'static str,
+    /// What it is mistaken for.
+    pub mistaken_for: &'static [&'static str],
+    /// Linear coefficients, in the order of the columns.
+    pub linear: &'static [Linear],
+    /// Nonlinear parameters, in the order of [`Theta`].
+    pub nonlinear: &'static [Nonlinear],
+    /// Natural log of its prior odds against being absent.
+    pub log_prior: f64,
+    /// Starting points over the whole prior range.
+    pub grid: fn(&Scene) -> Vec<Theta>,
+    /// Log of the prior volume of `Theta` in its coordinates (of the number of points, if they are discrete).
+    pub log_volume: fn(&Scene) -> f64,
+    /// Its series at `Theta`, `None` where the case does not allow it (no such event, for one).
+    pub signature: fn(&Scene, &Theta) -> Option<Shape>,
+    /// Why it is this one, for a flight engineer.
+    pub why: &'static str,
+}
+
+/// A linear coefficient.
+pub struct Linear {
+    /// Name in `diagnosis.json`.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Standard deviation of its prior.
+    pub size: f64,
+    /// A value beyond this is not credible, whatever the fit.
+    pub size_max: f64,
+}
+
+/// A nonlinear parameter.
+pub struct Nonlinear {
+    /// Name in `diagnosis.json`; a word (`axis`) is discrete.
+    pub name: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// The coordinate is its logarithm.
+    pub log: bool,
+    /// First step of its refinement, in its coordinate; 0 for a discrete one.
+    pub step: f64,
+    /// Lowest and highest coordinate, where the scene does not say otherwise.
+    pub range: [f64; 2],
+}
+
+/// The form of a signature.
+#[derive(Debug, Clone)]
+pub enum Shape {
+    /// One series, with a coefficient for every body axis.
+    Scalar(Vec<f64>),
+    /// One series triple a coefficient.
+    Columns(Vec<Raw>),
+    /// A series whose amplitude is given by `Theta` alone.
+    Fixed(Axes),
+}
+
+impl Shape {
+    /// As columns; a fixed shape is one column.
+    pub fn columns(&self) -> Vec<Raw> {
+        match self {
+            Shape::Scalar(series) => {
+                (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| series.clone()))).collect()
+            }
+            Shape::Columns(columns) => columns.clone(),
+            Shape::Fixed(axes) => vec![full(axes.clone())],
+        }
+    }
+}
+
+/// A column on all three axes.
+pub fn full(axes: Axes) -> Raw {
+    axes.map(Some)
+}
+
+/// The single point of effects without nonlinear parameters.
+pub fn one_point(_: &Scene) -> Vec<Theta> {
+    vec![[0.0; 2]]
+}
+
+/// The volume of a single point.
+pub fn no_volume(_: &Scene) -> f64 {
+    0.0
+}
+
+/// Prior odds of an effect that is met as often as any other: about one in fifty records each.
+pub const COMMON: f64 = -4.0;
+/// Prior odds of one that is met less often.
+pub const RARE: f64 = -6.0;
+
+/// Three coefficients of a push fixed in the body.
+pub const fn push(size_ng: f64, size_max_ng: f64) -> [Linear; 3] {
+    [
+        Linear { name: "ax_ng", unit: "ng", size: size_ng, size_max: size_max_ng },
+        Linear { name: "ay_ng", unit: "ng", size: size_ng, size_max: size_max_ng },
+        Linear { name: "az_ng", unit: "ng", size: size_ng, size_max: size_max_ng },
+    ]
+}
+
+/// Onsets at a spacing inside the record, away from its ends by `margin_s`.
+pub fn onsets(scene: &Scene, spacing_s: f64, margin_s: f64) -> Vec<f64> {
+    let [start, end] = scene.span_s();
+    let n = ((end - start - 2.0 * margin_s) / spacing_s).floor().max(0.0) as usize;
+    (0..=n).map(|i| start + margin_s + i as f64 * spacing_s).collect()
+}
+
+/// The series of a logged kind, if the log has it inside the record.
+pub fn logged(scene: &Scene, kind: &str) -> Option<Vec<f64>> {
+    let share = super::measure::coverage(scene.clock_s(), &scene.case.spans(kind));
+    let windows = share.iter().filter(|s| **s > 0.0).count();
+    (windows >= 2 && windows + 2 <= share.len()).then_some(share)
+}

@@ -1,0 +1,27 @@
+//! Rotation left out of the simulation: w x (w x r) + dw/dt x r at the sensor.
+
+use crate::units::NANO_G_M_S2;
+
+use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "rotation",
+    name: "Rotation terms left out",
+    equation: "w x (w x r) + dw/dt x r",
+    source: "standard mechanics; 0.02 deg/s at 10 m is 124 ng",
+    mistaken_for: &["cg_offset"],
+    linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0 }],
+    nonlinear: &[],
+    log_prior: COMMON,
+    grid: one_point,
+    log_volume: no_volume,
+    signature: signature,
+    why: "The residual follows the square of the body rates and their change at the assumed sensor position, largest in manoeuvres.",
+};
+
+fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
+    let offset = scene.vehicle.sensor_offset_m;
+    Some(Shape::Columns(vec![full(scene.measure(|i| scene.rotation_s2(i) * offset / NANO_G_M_S2))]))
+}

@@ -1,0 +1,33 @@
+//! One axis reads (1 + fraction) times the truth.
+
+use super::{COMMON, Effect, Linear, Nonlinear, Shape, Theta};
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "scale_factor",
+    name: "Scale factor of one axis",
+    equation: "fraction x m on one axis, m the modelled signal",
+    source: "ground and flight calibrations differed by 3-14 %",
+    mistaken_for: &["aerodynamic_drag"],
+    linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 1.5 }],
+    nonlinear: &[Nonlinear { name: "axis", unit: "", log: false, step: 0.0, range: [0.0, 2.0] }],
+    log_prior: COMMON,
+    grid: grid,
+    log_volume: log_volume,
+    signature: signature,
+    why: "All the modelled physics of one axis is off by the same factor, gravity gradient and drag alike, and the other axes are not.",
+};
+
+fn grid(_: &Scene) -> Vec<Theta> {
+    vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]
+}
+
+fn log_volume(_: &Scene) -> f64 {
+    3.0_f64.ln()
+}
+
+fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
+    let axis = theta[0] as usize;
+    Some(Shape::Columns(vec![std::array::from_fn(|k| (k == axis).then(|| scene.simulated_ng[k].clone()))]))
+}

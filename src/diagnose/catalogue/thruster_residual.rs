@@ -1,0 +1,24 @@
+//! A push while a logged event of kind `thruster` lasts.
+
+use super::{COMMON, Effect, Shape, logged, no_volume, one_point, push};
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "thruster_residual",
+    name: "Thruster residual",
+    equation: "a x (share of the window inside logged events)",
+    source: "1-400 ng after the trimmed mean",
+    mistaken_for: &["attitude deadband: jets fire at its edges"],
+    linear: &push(150.0, 3000.0),
+    nonlinear: &[],
+    log_prior: COMMON,
+    grid: one_point,
+    log_volume: no_volume,
+    signature: signature,
+    why: "The residual is a push fixed in the body that is there only while logged firings last.",
+};
+
+fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
+    logged(scene, "thruster").map(Shape::Scalar)
+}

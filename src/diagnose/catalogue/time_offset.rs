@@ -1,0 +1,45 @@
+//! The recording's clock runs ahead: what happened at t is labelled t + offset.
+
+use super::{COMMON, Effect, Nonlinear, Shape, Theta};
+use crate::diagnose::measure::Measurement;
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "time_offset",
+    name: "Clock offset",
+    equation: "m(t - offset) - m(t), m the modelled signal",
+    source: "under 1 ng per second in a hold, large in manoeuvres",
+    mistaken_for: &["an attitude latency (the same)"],
+    linear: &[],
+    nonlinear: &[Nonlinear { name: "offset_s", unit: "s", log: false, step: 3.0, range: [-600.0, 600.0] }],
+    log_prior: COMMON,
+    grid: grid,
+    log_volume: log_volume,
+    signature: signature,
+    why: "The recording shows the modelled signal late or early: the difference follows its time derivative, manoeuvres above all.",
+};
+
+/// Largest offset, s.
+const OFFSET_S_MAX: f64 = 600.0;
+
+fn grid(_: &Scene) -> Vec<Theta> {
+    let steps =
+        [5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 75.0, 90.0, 105.0, 120.0, 150.0, 180.0, 240.0, 300.0, 400.0, 500.0];
+    steps.iter().flat_map(|s| [[*s, 0.0], [-s, 0.0]]).collect()
+}
+
+fn log_volume(_: &Scene) -> f64 {
+    (2.0 * OFFSET_S_MAX).ln()
+}
+
+fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
+    if theta[0].abs() > OFFSET_S_MAX {
+        return None;
+    }
+    let late =
+        Measurement::new(&scene.case.simulation.clock_s, scene.clock_s(), theta[0]).apply3(&scene.case.simulation.a_ng);
+    Some(Shape::Fixed(std::array::from_fn(|k| {
+        late[k].iter().zip(&scene.simulated_ng[k]).map(|(a, b)| a - b).collect()
+    })))
+}

@@ -1,0 +1,49 @@
+//! A decaying push fixed in the body from an unlogged instant.
+
+use super::{COMMON, Effect, Nonlinear, Shape, Theta, onsets, push};
+use crate::diagnose::measure::decay;
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "vent_leak",
+    name: "Vent or leak, decaying push",
+    equation: "a exp(-(t - onset)/tau) after the onset",
+    source: "1 kg/day at 300 m/s is 3.5 ng",
+    mistaken_for: &["bias_step", "bias_drift"],
+    linear: &push(80.0, 3000.0),
+    nonlinear: &[
+        Nonlinear { name: "onset_s", unit: "s", log: false, step: 300.0, range: [f64::NEG_INFINITY, f64::INFINITY] },
+        Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, range: [5.7, 11.5] },
+    ],
+    log_prior: COMMON,
+    grid: grid,
+    log_volume: log_volume,
+    signature: signature,
+    why: "A push fixed in the body begins at an instant no log names and dies away exponentially, whatever the attitude does.",
+};
+
+/// Time constants tried first, s, and the spacing of the onsets for each as a share of it.
+const TAUS_S: [f64; 7] = [600.0, 1200.0, 2400.0, 4800.0, 9600.0, 19_200.0, 38_400.0];
+
+/// Shortest and longest decay, s: faster is an event, slower is a step.
+const TAU_RANGE_S: [f64; 2] = [300.0, 80_000.0];
+
+fn grid(scene: &Scene) -> Vec<Theta> {
+    let points = |tau: &f64| {
+        onsets(scene, (0.5 * tau).clamp(300.0, 1800.0), 600.0).into_iter().map(|t| [t, tau.ln()]).collect::<Vec<_>>()
+    };
+    TAUS_S.iter().flat_map(points).collect()
+}
+
+fn log_volume(scene: &Scene) -> f64 {
+    let [start, end] = scene.span_s();
+    ((end - start) * (TAU_RANGE_S[1] / TAU_RANGE_S[0]).ln()).ln()
+}
+
+fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
+    let [start, end] = scene.span_s();
+    let inside =
+        theta[0] > start && theta[0] < end - 300.0 && theta[1] > TAU_RANGE_S[0].ln() && theta[1] < TAU_RANGE_S[1].ln();
+    inside.then(|| Shape::Scalar(decay(scene.clock_s(), theta[0], theta[1].exp())))
+}

@@ -1,0 +1,24 @@
+//! A push while a logged event of kind `water_dump` lasts.
+
+use super::{COMMON, Effect, Shape, logged, no_volume, one_point, push};
+use crate::diagnose::scene::Scene;
+
+/// The entry.
+pub const EFFECT: Effect = Effect {
+    id: "water_dump",
+    name: "Water dump",
+    equation: "a x (share of the window inside logged events)",
+    source: "about 1 ug in body Y was seen; 250-1000 ng",
+    mistaken_for: &["nearly nothing"],
+    linear: &push(300.0, 5000.0),
+    nonlinear: &[],
+    log_prior: COMMON,
+    grid: one_point,
+    log_volume: no_volume,
+    signature: signature,
+    why: "The residual is a push fixed in the body that begins and ends with the logged water dumps.",
+};
+
+fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
+    logged(scene, "water_dump").map(Shape::Scalar)
+}

@@ -1,0 +1,165 @@
+//! Where the mismatch is: axes, frame and direction, times, covariates, lines of the orbit. Said even when nothing can be named.
+
+use nalgebra::SymmetricEigen;
+
+use crate::physics::{Mat3, Vec3};
+
+use super::answer::{Covariate, Interval, Located, OrbitLine};
+use super::design::{Chosen, Frame};
+use super::scene::{Axes, Scene};
+
+/// Share of the signal's energy an axis needs to be named.
+const AXIS_SHARE: f64 = 0.05;
+/// Intervals named at most.
+const INTERVALS_MAX: usize = 12;
+
+/// Axes, frame and times of a signal the best hypothesis puts into the residual.
+pub fn of_signal(scene: &Scene, signal: &Axes, why: &str) -> Located {
+    let clock = scene.clock_s();
+    let n = clock.len();
+    let mean: [f64; 3] = std::array::from_fn(|k| signal[k].iter().sum::<f64>() / n as f64);
+    let energy: [f64; 3] = std::array::from_fn(|k| signal[k].iter().map(|x| (x - mean[k]).powi(2)).sum());
+    let total: f64 = energy.iter().sum();
+    let axes = ["x", "y", "z"]
+        .iter()
+        .zip(energy)
+        .filter(|(_, e)| *e > AXIS_SHARE * total && total > 0.0)
+        .map(|(a, _)| a.to_string())
+        .collect();
+    let (frame, direction) = direction(scene, signal);
+    let size: Vec<f64> = (0..n).map(|i| (0..3).map(|k| signal[k][i].powi(2)).sum::<f64>().sqrt()).collect();
+    Located {
+        axes,
+        frame,
+        direction,
+        intervals: intervals(clock, &size, why),
+        covariates: Vec::new(),
+        per_orbit_lines: Vec::new(),
+    }
+}
+
+/// The frame in which the signal keeps most to one line, and that line if it carries nine tenths of it.
+fn direction(scene: &Scene, signal: &Axes) -> (String, Option<[f64; 3]>) {
+    let rotations: [(&str, &dyn Fn(usize) -> Mat3); 4] = [
+        ("body", &|_| Mat3::identity()),
+        ("lvlh", &|g| lvlh(scene, g) * scene.body[g].transpose()),
+        ("inertial", &|g| scene.body[g].transpose()),
+        ("sun", &|g| sun_frame(scene, g) * scene.body[g].transpose()),
+    ];
+    let mut best = ("body", 0.0, Vec3::zeros());
+    for (name, rotation) in rotations {
+        let mut outer = Mat3::zeros();
+        for (i, t) in scene.clock_s().iter().enumerate() {
+            let g = scene.grid_s.partition_point(|x| x < t).min(scene.grid_s.len() - 1);
+            let v = rotation(g) * Vec3::new(signal[0][i], signal[1][i], signal[2][i]);
+            outer += v * v.transpose();
+        }
+        let trace = outer.trace();
+        if trace <= 0.0 {
+            continue;
+        }
+        let eigen = SymmetricEigen::new(outer);
+        let top = eigen.eigenvalues.imax();
+        let share = eigen.eigenvalues[top] / trace;
+        // Another frame must be clearly steadier than the body's.
+        if share > best.1 + 0.02 {
+            best = (name, share, eigen.eigenvectors.column(top).into_owned());
+        }
+    }
+    (best.0.to_string(), (best.1 > 0.9).then(|| [best.2.x, best.2.y, best.2.z]))
+}
+
+fn lvlh(scene: &Scene, g: usize) -> Mat3 {
+    let down = -scene.r_m[g].normalize();
+    let right = -scene.r_m[g].cross(&scene.v_m_s[g]).normalize();
+    Mat3::from_rows(&[right.cross(&down).transpose(), right.transpose(), down.transpose()])
+}
+
+fn sun_frame(scene: &Scene, g: usize) -> Mat3 {
+    let x = scene.sun[g];
+    let z = Vec3::z() - x * x.z;
+    let z = z.normalize();
+    Mat3::from_rows(&[x.transpose(), z.cross(&x).transpose(), z.transpose()])
+}
+
+/// Spans in which the signal is more than a quarter of its largest, nearby ones joined.
+fn intervals(clock: &[f64], size: &[f64], why: &str) -> Vec<Interval> {
+    let largest = size.iter().copied().fold(0.0, f64::max);
+    if largest <= 0.0 {
+        return Vec::new();
+    }
+    let span = clock[clock.len() - 1] - clock[0];
+    let mut join_s = 300.0;
+    loop {
+        let mut out: Vec<Interval> = Vec::new();
+        for (t, s) in clock.iter().zip(size) {
+            if *s < 0.25 * largest {
+                continue;
+            }
+            match out.last_mut() {
+                Some(last) if t - last.end_s < join_s => last.end_s = *t,
+                _ => out.push(Interval { start_s: *t, end_s: *t, why: why.to_string() }),
+            }
+        }
+        if out.len() <= INTERVALS_MAX || join_s > span {
+            return out;
+        }
+        join_s *= 2.0;
+    }
+}
+
+/// Covariates by the evidence of following them, best first, those above nothing.
+pub fn covariates(scores: impl Iterator<Item = (String, f64)>) -> Vec<Covariate> {
+    let mut best: Vec<Covariate> = Vec::new();
+    for (name, score) in scores {
+        match best.iter_mut().find(|c| c.name == name) {
+            Some(c) => c.score = c.score.max(score),
+            None => best.push(Covariate { name, score }),
+        }
+    }
+    best.retain(|c| c.score > 0.0);
+    best.sort_by(|a, b| b.score.total_cmp(&a.score));
+    best.truncate(6);
+    best
+}
+
+/// Lines of the residual in cycles per orbit that stand out of the whole search for lines.
+pub fn lines(scene: &Scene, frame: &Frame) -> Vec<OrbitLine> {
+    let empty = Chosen::new(frame, Vec::new(), &[]);
+    let cycles: Vec<f64> = (1..=60).map(|i| 0.1 * i as f64).collect();
+    let charge = ((cycles.len() * 3) as f64).ln() + 4.0;
+    let mut found: Vec<(f64, OrbitLine)> = Vec::new();
+    for &c in &cycles {
+        let rate = std::f64::consts::TAU * c / scene.period_s;
+        let [sin, cos]: [Vec<f64>; 2] = [
+            scene.clock_s().iter().map(|t| (rate * t).sin()).collect(),
+            scene.clock_s().iter().map(|t| (rate * t).cos()).collect(),
+        ];
+        for axis in 0..3 {
+            let columns = [frame.scalar(axis, &sin, 30.0), frame.scalar(axis, &cos, 30.0)];
+            let gain = empty.gain(&columns);
+            if gain > charge {
+                let (mean, _) = Chosen::new(frame, columns.iter().collect(), &[]).posterior();
+                let amplitude_ng = 30.0 * (mean[0].powi(2) + mean[1].powi(2)).sqrt();
+                found.push((
+                    gain,
+                    OrbitLine {
+                        cycles_per_orbit: (c * 10.0).round() / 10.0,
+                        axis: ["x", "y", "z"][axis].into(),
+                        amplitude_ng,
+                    },
+                ));
+            }
+        }
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // The side lobes of a stronger line are not lines.
+    let mut kept: Vec<OrbitLine> = Vec::new();
+    for (_, line) in found {
+        if kept.iter().all(|k| k.axis != line.axis || (k.cycles_per_orbit - line.cycles_per_orbit).abs() > 0.15) {
+            kept.push(line);
+        }
+    }
+    kept.truncate(6);
+    kept
+}

@@ -1,0 +1,275 @@
+//! The fitted set: parameters with their joint covariance, and what it predicts of data it has not seen.
+//!
+//! The covariance is that of the linearised joint fit, coefficients and nonlinear parameters together, at the fitted noise.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::answer::HeldOut;
+use super::design::{Chosen, Column, Frame};
+use super::noise::{AxisNoise, Schedule};
+use super::scene::{Axes, Scene};
+use super::search::{self, Entry, Family, Set};
+
+/// Length of the blocks that are held out in turn, s.
+pub const BLOCK_S: f64 = 21_600.0;
+
+/// A fitted number.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fitted {
+    /// Name.
+    pub name: &'static str,
+    /// Value.
+    pub value: f64,
+    /// Standard error.
+    pub sigma: f64,
+    /// Unit.
+    pub unit: &'static str,
+}
+
+/// A member's numbers.
+#[derive(Debug, Clone, Default)]
+pub struct MemberFit {
+    /// Numbers, nonlinear ones first.
+    pub parameters: Vec<Fitted>,
+    /// The axis of a scale factor.
+    pub axis: Option<String>,
+    /// Coefficients that are larger than credible: name, value, limit.
+    pub incredible: Vec<(&'static str, f64, f64)>,
+}
+
+/// Parameters of every member, the errors multiplied by `inflation`.
+pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, inflation: f64) -> Vec<MemberFit> {
+    let (mean, linear_covariance) = set.coefficients(frame, entries);
+    let joint = joint_covariance(scene, frame, entries, set).unwrap_or(linear_covariance);
+    let mut next = 0;
+    let mut theta_next = mean.len();
+    let mut out = Vec::new();
+    for m in &set.members {
+        let mut fit = MemberFit::default();
+        let Family::Listed(effect) = entries[m.entry].family else {
+            for k in 0..m.linear() {
+                fit.parameters.push(Fitted {
+                    name: "amplitude_ng",
+                    value: mean[next + k],
+                    sigma: joint[(next + k, next + k)].max(0.0).sqrt() * inflation,
+                    unit: "ng",
+                });
+            }
+            next += m.linear();
+            out.push(fit);
+            continue;
+        };
+        for (j, p) in effect.nonlinear.iter().enumerate() {
+            if p.name == "axis" {
+                fit.axis = Some(["x", "y", "z"][m.theta[j] as usize].to_string());
+                continue;
+            }
+            let sigma = if p.step > 0.0 {
+                theta_next += 1;
+                joint.get((theta_next - 1, theta_next - 1)).map_or(m.theta_sigma[j], |v| v.max(0.0).sqrt()) * inflation
+            } else {
+                1.0
+            };
+            let value = if p.log { m.theta[j].exp() } else { m.theta[j] };
+            fit.parameters.push(Fitted {
+                name: p.name,
+                value,
+                sigma: if p.log { value * sigma } else { sigma },
+                unit: p.unit,
+            });
+        }
+        for (k, l) in effect.linear.iter().enumerate().take(m.linear()) {
+            let value = mean[next + k];
+            fit.parameters.push(Fitted {
+                name: l.name,
+                value,
+                sigma: joint[(next + k, next + k)].max(0.0).sqrt() * inflation,
+                unit: l.unit,
+            });
+            if value.abs() > l.size_max {
+                fit.incredible.push((l.name, value, l.size_max));
+            }
+        }
+        next += m.linear();
+        out.push(fit);
+    }
+    out
+}
+
+/// Covariance of all coefficients, then of all free nonlinear parameters, from the linearised joint fit.
+fn joint_covariance(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) -> Option<DMatrix<f64>> {
+    let mut columns: Vec<Column> = Vec::new();
+    let mut prior: Vec<f64> = Vec::new();
+    for m in &set.members {
+        let entry = &entries[m.entry];
+        let raws = entry_columns(scene, entry, &m.theta)?;
+        for k in 0..m.linear() {
+            columns.push(frame.column(&raws[m.axis.unwrap_or(k)], 1.0));
+            prior.push(entry.sizes[m.axis.unwrap_or(k)].powi(-2));
+        }
+    }
+    for (i, m) in set.members.iter().enumerate() {
+        let Family::Listed(effect) = entries[m.entry].family else { continue };
+        for (j, p) in effect.nonlinear.iter().enumerate().filter(|(_, p)| p.step > 0.0) {
+            let h = (0.5 * m.theta_sigma[j]).clamp(0.01 * p.step, 2.0 * p.step);
+            let at = |sign: f64| {
+                let mut moved = set.clone();
+                moved.members[i].theta[j] += sign * h;
+                member_series(scene, frame, entries, set, &moved, i)
+            };
+            let (high, low) = (at(1.0), at(-1.0));
+            let (high, low, span) = match (high, low) {
+                (Some(high), Some(low)) => (high, low, 2.0 * h),
+                (Some(high), None) => (high, member_series(scene, frame, entries, set, set, i)?, h),
+                (None, Some(low)) => (member_series(scene, frame, entries, set, set, i)?, low, h),
+                (None, None) => return None,
+            };
+            let slope =
+                std::array::from_fn(|k| Some(high[k].iter().zip(&low[k]).map(|(a, b)| (a - b) / span).collect()));
+            columns.push(frame.column(&slope, 1.0));
+            prior.push(0.0);
+        }
+    }
+    let n = columns.len();
+    let a = DMatrix::from_fn(n, n, |i, j| columns[i].dot(&columns[j]) + if i == j { prior[i] } else { 0.0 });
+    // Scaled to unit diagonal before inversion: the units span twelve orders.
+    let scale = DVector::from_iterator(n, (0..n).map(|i| a[(i, i)].max(1e-300).sqrt().recip()));
+    let scaled = DMatrix::from_fn(n, n, |i, j| a[(i, j)] * scale[i] * scale[j]);
+    let inverse = (scaled + DMatrix::identity(n, n) * 1e-9).try_inverse()?;
+    Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
+}
+
+fn entry_columns(scene: &Scene, entry: &Entry, theta: &super::catalogue::Theta) -> Option<Vec<super::design::Raw>> {
+    match entry.family {
+        Family::Listed(effect) => (effect.signature)(scene, theta).map(|s| s.columns()),
+        Family::Open(_) => Some(entry.points[0].1.columns()),
+    }
+}
+
+/// Series of member `i` of `moved`, with the coefficients of `set`.
+fn member_series(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, moved: &Set, i: usize) -> Option<Axes> {
+    let (mean, _) = set.coefficients(frame, entries);
+    let first: usize = set.members[..i].iter().map(|m| m.linear()).sum();
+    let m = &moved.members[i];
+    let columns = entry_columns(scene, &entries[m.entry], &m.theta)?;
+    let mut sum: Axes = std::array::from_fn(|_| vec![0.0; scene.schedule.len()]);
+    for j in 0..m.linear().max(1) {
+        let factor = if m.linear() == 0 { 1.0 } else { mean[first + j] };
+        for (total, series) in sum.iter_mut().zip(&columns[m.axis.unwrap_or(j)]) {
+            if let Some(series) = series {
+                total.iter_mut().zip(series).for_each(|(t, x)| *t += factor * x);
+            }
+        }
+    }
+    Some(sum)
+}
+
+/// RMS with the mean removed.
+pub fn rms(series: &[f64]) -> f64 {
+    let n = series.len().max(1) as f64;
+    let mean = series.iter().sum::<f64>() / n;
+    (series.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt()
+}
+
+/// One half of the record, as a case of its own.
+struct Half {
+    index: Vec<usize>,
+    frame: Frame,
+}
+
+fn pick(series: &[f64], index: &[usize]) -> Vec<f64> {
+    index.iter().map(|i| series[*i]).collect()
+}
+
+fn half(scene: &Scene, noise: &[AxisNoise; 3], index: Vec<usize>) -> Half {
+    let schedule = Schedule::new(&pick(scene.clock_s(), &index));
+    let sub = |axes: &Axes| -> Axes { std::array::from_fn(|k| pick(&axes[k], &index)) };
+    Half { frame: Frame::new(noise, &schedule, &sub(&scene.activity), &sub(&scene.residual_ng)), index }
+}
+
+/// Predict each half of the alternate blocks from the other. Nonlinear parameters stay as fitted; amplitudes are fitted anew.
+pub fn held_out(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, noise: &[AxisNoise; 3]) -> HeldOut {
+    let clock = scene.clock_s();
+    let block = |i: usize| ((clock[i] - clock[0]) / BLOCK_S) as usize;
+    let n = clock.len();
+    let halves: Vec<Half> =
+        (0..2).map(|side| half(scene, noise, (0..n).filter(|i| block(*i) % 2 == side).collect())).collect();
+    let full = search::residual(scene, frame, entries, set);
+    let mut after: Axes = scene.residual_ng.clone();
+    let mut signal_energy = 0.0;
+    let mut missed_energy = 0.0;
+    let mut block_gain = vec![0.0; block(n - 1) + 1];
+    for side in 0..2 {
+        let (train, test) = (&halves[1 - side], &halves[side]);
+        if train.index.len() < 50 || test.index.len() < 50 {
+            continue;
+        }
+        let predicted = predict(scene, entries, set, train);
+        let on_test = |axes: &Axes| test.frame.column(&std::array::from_fn(|k| Some(pick(&axes[k], &test.index))), 1.0);
+        let p = on_test(&predicted);
+        let fitted: Axes =
+            std::array::from_fn(|k| scene.residual_ng[k].iter().zip(&full[k]).map(|(a, b)| a - b).collect());
+        let s = on_test(&fitted);
+        let missed = s.less(&p, 1.0);
+        signal_energy += s.dot(&s);
+        missed_energy += missed.dot(&missed);
+        let left = test.frame.data.less(&p, 1.0);
+        for k in 0..3 {
+            let (b, a) = (test.frame.data.projected(k, &test.frame), left.projected(k, &test.frame));
+            for (place, i) in test.index.iter().enumerate() {
+                block_gain[block(*i)] += 0.5 * (b[place].powi(2) - a[place].powi(2));
+            }
+            for i in &test.index {
+                after[k][*i] -= predicted[k][*i];
+            }
+        }
+    }
+    let gain: f64 = block_gain.iter().sum();
+    let count = block_gain.len() as f64;
+    let spread = block_gain.iter().map(|g| (g - gain / count).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    HeldOut {
+        scheme: "alternate 6 h blocks".into(),
+        before_rms_ng: std::array::from_fn(|k| rms(&scene.residual_ng[k])),
+        after_rms_ng: std::array::from_fn(|k| rms(&after[k])),
+        excess_removed: if signal_energy > 0.0 { 1.0 - missed_energy / signal_energy } else { 0.0 },
+        log_score_gain: gain,
+        log_score_gain_se: (spread * count).sqrt(),
+    }
+}
+
+/// The set's series over the whole record with amplitudes fitted to one half.
+fn predict(scene: &Scene, entries: &[Entry], set: &Set, train: &Half) -> Axes {
+    let n = scene.schedule.len();
+    let mut sum: Axes = std::array::from_fn(|_| vec![0.0; n]);
+    let mut linear: Vec<(Column, super::design::Raw, f64)> = Vec::new();
+    let mut fixed: Vec<Column> = Vec::new();
+    for m in &set.members {
+        let Some(raws) = entry_columns(scene, &entries[m.entry], &m.theta) else { continue };
+        for j in 0..m.linear().max(1) {
+            let place = m.axis.unwrap_or(j);
+            let raw = raws[place].clone();
+            let part = raw.clone().map(|series| series.map(|s| pick(&s, &train.index)));
+            if m.linear() == 0 {
+                fixed.push(train.frame.column(&part, 1.0));
+                add(&mut sum, &raw, 1.0);
+            } else {
+                let size = entries[m.entry].sizes[place];
+                linear.push((train.frame.column(&part, size), raw, size));
+            }
+        }
+    }
+    let chosen = Chosen::new(&train.frame, linear.iter().map(|l| &l.0).collect(), &fixed.iter().collect::<Vec<_>>());
+    let (mean, _) = chosen.posterior();
+    for (value, (_, raw, size)) in mean.iter().zip(&linear) {
+        add(&mut sum, raw, value * size);
+    }
+    sum
+}
+
+fn add(sum: &mut Axes, raw: &super::design::Raw, factor: f64) {
+    for (total, series) in sum.iter_mut().zip(raw) {
+        if let Some(series) = series {
+            total.iter_mut().zip(series).for_each(|(t, x)| *t += factor * x);
+        }
+    }
+}

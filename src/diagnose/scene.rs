@@ -1,0 +1,238 @@
+//! Everything the case implies before any search: the residual, and the physics of its orbit on the ancillary grid.
+//!
+//! All here comes from epoch, position, attitude and the log, by the project's own physics; no regressor is read from
+//! the simulation but its signal itself. Not here: which of it explains anything.
+
+use crate::physics::{self, Mat3, Vec3};
+use crate::units::NANO_G_M_S2;
+
+use super::case::{Case, HALF_WINDOW_S};
+use super::error::CaseError;
+use super::measure::{Measurement, coverage};
+use super::noise::{Schedule, activity};
+
+/// One series per body axis.
+pub type Axes = [Vec<f64>; 3];
+
+/// The case, measured and furnished with its physics.
+#[derive(Clone)]
+pub struct Scene<'a> {
+    /// The case.
+    pub case: &'a Case,
+    /// Window centres and steps.
+    pub schedule: Schedule,
+    /// Activity of each window, per axis.
+    pub activity: Axes,
+    /// Recording less measured simulation, ng.
+    pub residual_ng: Axes,
+    /// The measured simulation, ng.
+    pub simulated_ng: Axes,
+    /// The simulation on the ancillary grid, ng.
+    pub simulated_grid_ng: Axes,
+    /// From the ancillary grid to the windows.
+    pub measurement: Measurement,
+    /// The vehicle, for the force models.
+    pub vehicle: physics::vehicle::Vehicle,
+    /// Ancillary grid.
+    pub grid_s: Vec<f64>,
+    /// Rotation from inertial to body axes on the grid.
+    pub body: Vec<Mat3>,
+    /// Position on the grid.
+    pub r_m: Vec<Vec3>,
+    /// Velocity on the grid.
+    pub v_m_s: Vec<Vec3>,
+    /// Body rate on the grid.
+    pub w_rad_s: Vec<Vec3>,
+    /// Its derivative.
+    pub wdot_rad_s2: Vec<Vec3>,
+    /// Unit vector to the Sun, inertial.
+    pub sun: Vec<Vec3>,
+    /// Sunlit fraction.
+    pub sunlit: Vec<f64>,
+    /// Geomagnetic field, body axes, T.
+    pub field_body_t: Vec<Vec3>,
+    /// Drag as modelled with a co-rotating atmosphere, body axes, ng.
+    pub drag_ng: Vec<Vec3>,
+    /// Sensor temperature.
+    pub temperature_c: Vec<f64>,
+    /// Orbital period, s.
+    pub period_s: f64,
+}
+
+impl<'a> Scene<'a> {
+    /// Furnish a checked case.
+    pub fn new(case: &'a Case) -> Result<Self, CaseError> {
+        let anc = &case.ancillary;
+        let windows = &case.recording.clock_s;
+        let to_windows = Measurement::new(&case.simulation.clock_s, windows, 0.0);
+        let simulated_ng = to_windows.apply3(&case.simulation.a_ng);
+        let residual_ng =
+            std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
+        let asleep: Vec<bool> = coverage(windows, &case.spans("crew_sleep")).iter().map(|c| *c > 0.5).collect();
+        let vector = |v: &[f64; 3]| Vec3::new(v[0], v[1], v[2]);
+        let r_m: Vec<Vec3> = anc.r_m.iter().map(vector).collect();
+        let v_m_s: Vec<Vec3> = anc.v_m_s.iter().map(vector).collect();
+        let w_rad_s: Vec<Vec3> = anc.w_rad_s.iter().map(vector).collect();
+        let body = bodies(&anc.q)?;
+        let vehicle = vehicle(case);
+        let unix: Vec<f64> = anc.clock_s.iter().map(|t| case.header.unix_s(*t)).collect();
+        let sun: Vec<Vec3> = unix.iter().map(|t| physics::sun::direction(*t)).collect();
+        let sunlit = r_m.iter().zip(&sun).map(|(r, s)| physics::shadow::sunlit_fraction(r, s)).collect();
+        let field_body_t = fields(&unix, &r_m, &body)?;
+        let drag_ng = (0..r_m.len())
+            .map(|i| drag_ng(&vehicle, anc.density_kg_m3[i], &r_m[i], &v_m_s[i], &body[i], 1.0, &Vec3::zeros()))
+            .collect();
+        let period_s = period_s(&r_m[0], &v_m_s[0]);
+        Ok(Self {
+            schedule: Schedule::new(windows),
+            activity: std::array::from_fn(|k| activity(&case.recording.dev_ng[k], &asleep)),
+            residual_ng,
+            simulated_grid_ng: std::array::from_fn(|k| {
+                interpolate(&case.simulation.clock_s, &case.simulation.a_ng[k], &anc.clock_s)
+            }),
+            simulated_ng,
+            measurement: Measurement::new(&anc.clock_s, windows, 0.0),
+            vehicle,
+            grid_s: anc.clock_s.clone(),
+            wdot_rad_s2: gradient(&anc.clock_s, &w_rad_s),
+            body,
+            r_m,
+            v_m_s,
+            w_rad_s,
+            sun,
+            sunlit,
+            field_body_t,
+            drag_ng,
+            temperature_c: anc.temperature_c.clone(),
+            period_s,
+            case,
+        })
+    }
+
+    /// The same scene with another residual: a bootstrap replicate.
+    pub fn with_residual(&self, residual_ng: Axes) -> Self {
+        Self { residual_ng, ..self.clone() }
+    }
+
+    /// Window centres.
+    pub fn clock_s(&self) -> &[f64] {
+        &self.schedule.clock_s
+    }
+
+    /// Measure a vector given on the grid.
+    pub fn measure(&self, on_grid: impl Fn(usize) -> Vec3) -> Axes {
+        let series: Vec<Vec3> = (0..self.grid_s.len()).map(on_grid).collect();
+        std::array::from_fn(|k| self.measurement.apply(&series.iter().map(|v| v[k]).collect::<Vec<f64>>()))
+    }
+
+    /// Measure a number given on the grid.
+    pub fn measure_scalar(&self, on_grid: impl Fn(usize) -> f64) -> Vec<f64> {
+        self.measurement.apply(&(0..self.grid_s.len()).map(on_grid).collect::<Vec<f64>>())
+    }
+
+    /// Drag at grid point `i` with another co-rotation or wind, ng, body axes.
+    pub fn drag_with(&self, i: usize, corotation: f64, wind_m_s: &Vec3) -> Vec3 {
+        drag_ng(
+            &self.vehicle,
+            self.case.ancillary.density_kg_m3[i],
+            &self.r_m[i],
+            &self.v_m_s[i],
+            &self.body[i],
+            corotation,
+            wind_m_s,
+        )
+    }
+
+    /// Tensor T of a = T r: what a sensor offset of one metre feels, 1/s^2, at grid point `i`, body axes.
+    pub fn tensor_s2(&self, i: usize) -> Mat3 {
+        self.rotation_s2(i) - self.gradient_s2(i)
+    }
+
+    /// Gravity gradient G in body axes, 1/s^2.
+    pub fn gradient_s2(&self, i: usize) -> Mat3 {
+        physics::gravity_gradient::tensor_s2(&(self.body[i] * self.r_m[i]))
+    }
+
+    /// [w x][w x] + [dw/dt x], 1/s^2.
+    pub fn rotation_s2(&self, i: usize) -> Mat3 {
+        physics::rotation::tensor_s2(&self.w_rad_s[i], &self.wdot_rad_s2[i])
+    }
+
+    /// First and last instant any window sees.
+    pub fn span_s(&self) -> [f64; 2] {
+        let clock = self.clock_s();
+        [clock[0] - HALF_WINDOW_S, clock[clock.len() - 1] + HALF_WINDOW_S]
+    }
+}
+
+fn vehicle(case: &Case) -> physics::vehicle::Vehicle {
+    let v = &case.header.vehicle;
+    physics::vehicle::Vehicle {
+        mass_kg: v.mass_kg,
+        drag_coefficient: v.drag_coefficient,
+        area_m2: Vec3::from(v.area_m2),
+        sensor_offset_m: Vec3::from(v.sensor_offset_m),
+        srp_coefficient: v.srp_coefficient,
+    }
+}
+
+fn bodies(q: &[[f64; 4]]) -> Result<Vec<Mat3>, CaseError> {
+    q.iter()
+        .map(|q| {
+            let attitude = physics::attitude::from_scalar_first(q[0], q[1], q[2], q[3]);
+            attitude
+                .map(|a| physics::attitude::body_from_inertial(&a))
+                .ok_or_else(|| CaseError::Numeric(format!("ancillary data: {q:?} is no attitude")))
+        })
+        .collect()
+}
+
+fn fields(unix: &[f64], r_m: &[Vec3], body: &[Mat3]) -> Result<Vec<Vec3>, CaseError> {
+    (0..unix.len())
+        .map(|i| {
+            physics::magnetic::geomagnetic_field_t(unix[i], &r_m[i])
+                .map(|b| body[i] * b)
+                .map_err(|e| CaseError::Numeric(e.to_string()))
+        })
+        .collect()
+}
+
+fn drag_ng(
+    vehicle: &physics::vehicle::Vehicle,
+    density: f64,
+    r: &Vec3,
+    v: &Vec3,
+    body: &Mat3,
+    corotation: f64,
+    wind: &Vec3,
+) -> Vec3 {
+    let relative = body * physics::drag::relative_velocity_m_s(r, v, corotation, wind);
+    physics::drag::acceleration_m_s2(vehicle, density, &relative) / NANO_G_M_S2
+}
+
+fn period_s(r: &Vec3, v: &Vec3) -> f64 {
+    let energy = 0.5 * v.norm_squared() - physics::MU_M3_S2 / r.norm();
+    let axis = (-physics::MU_M3_S2 / (2.0 * energy)).abs();
+    std::f64::consts::TAU * (axis.powi(3) / physics::MU_M3_S2).sqrt()
+}
+
+/// Central differences, one-sided at the ends.
+fn gradient(grid: &[f64], values: &[Vec3]) -> Vec<Vec3> {
+    let last = grid.len() - 1;
+    (0..grid.len())
+        .map(|i| {
+            let [a, b] = [i.saturating_sub(1), (i + 1).min(last)];
+            (values[b] - values[a]) / (grid[b] - grid[a])
+        })
+        .collect()
+}
+
+fn interpolate(grid: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
+    at.iter()
+        .map(|t| {
+            let j = grid.partition_point(|g| g <= t).clamp(1, grid.len() - 1);
+            let share = ((t - grid[j - 1]) / (grid[j] - grid[j - 1])).clamp(0.0, 1.0);
+            values[j - 1] + share * (values[j] - values[j - 1])
+        })
+        .collect()
+}

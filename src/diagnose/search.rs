@@ -1,0 +1,488 @@
+//! The search over sets of effects, by evidence.
+//!
+//! A bank holds every family (a catalogue effect, or an open form) at all its starting points, whitened for the noise
+//! at hand. Sets grow from nothing in a beam, are refined in their nonlinear parameters, and are then weighed each with
+//! the noise fitted to its own residual: slow noise and a slow effect compete on equal terms. It decides nothing.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::catalogue::{Effect, Shape, Theta};
+use super::design::{Chosen, Column, Frame};
+use super::noise::{self, AxisNoise};
+use super::open_form::Atom;
+use super::optimise::nelder_mead;
+use super::scene::{Axes, Scene};
+
+/// Effects in a set at most.
+pub const SET_MAX: usize = 4;
+/// Sets kept while they grow.
+const BEAM: usize = 4;
+/// Sets weighed each with its own noise.
+const FINALISTS: usize = 10;
+/// Log evidence below the best at which a set is no longer followed.
+const FOLLOW: f64 = 12.0;
+
+/// What a family is.
+#[derive(Clone, Copy)]
+pub enum Family {
+    /// A catalogue effect.
+    Listed(&'static Effect),
+    /// An open form, by its place in the dictionary.
+    Open(usize),
+}
+
+/// A family with its series at every starting point, before whitening.
+pub struct Entry {
+    /// What it is.
+    pub family: Family,
+    /// Log prior odds.
+    pub log_prior: f64,
+    /// Log of the prior volume of the nonlinear parameters.
+    pub log_volume: f64,
+    /// Starting points.
+    pub points: Vec<(Theta, Shape)>,
+    /// Prior sizes of the coefficients.
+    pub sizes: Vec<f64>,
+}
+
+impl Entry {
+    /// A catalogue effect, `None` where the case does not allow it.
+    pub fn listed(scene: &Scene, effect: &'static Effect) -> Option<Self> {
+        let points: Vec<(Theta, Shape)> = (effect.grid)(scene)
+            .into_iter()
+            .filter_map(|theta| (effect.signature)(scene, &theta).map(|s| (theta, s)))
+            .collect();
+        (!points.is_empty()).then(|| Self {
+            family: Family::Listed(effect),
+            log_prior: effect.log_prior,
+            log_volume: (effect.log_volume)(scene),
+            points,
+            sizes: effect.linear.iter().map(|l| l.size).collect(),
+        })
+    }
+
+    /// An open form.
+    pub fn open(index: usize, atom: &Atom, log_prior: f64) -> Self {
+        let sizes = vec![
+            super::open_form::SIZE_NG;
+            if matches!(atom.shape, Shape::Scalar(_)) { 3 } else { atom.shape.columns().len() }
+        ];
+        Self {
+            family: Family::Open(index),
+            log_prior,
+            log_volume: 0.0,
+            points: vec![([0.0; 2], atom.shape.clone())],
+            sizes,
+        }
+    }
+
+    fn effect(&self) -> Option<&'static Effect> {
+        match self.family {
+            Family::Listed(effect) => Some(effect),
+            Family::Open(_) => None,
+        }
+    }
+}
+
+/// A family at one point, whitened.
+#[derive(Clone)]
+pub struct Whitened {
+    theta: Theta,
+    columns: Vec<Column>,
+    fixed: bool,
+}
+
+/// Every entry, whitened for one noise.
+pub struct Bank<'a> {
+    /// The entries.
+    pub entries: &'a [Entry],
+    points: Vec<Vec<Whitened>>,
+}
+
+fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64]) -> Whitened {
+    let (columns, fixed) = match shape {
+        Shape::Scalar(series) => ((0..3).map(|k| frame.scalar(k, series, sizes[k])).collect(), false),
+        Shape::Columns(raws) => (raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, *size)).collect(), false),
+        Shape::Fixed(axes) => (vec![frame.column(&axes.clone().map(Some), 1.0)], true),
+    };
+    Whitened { theta, columns, fixed }
+}
+
+impl<'a> Bank<'a> {
+    /// Whiten all.
+    pub fn new(frame: &Frame, entries: &'a [Entry]) -> Self {
+        let points = entries
+            .iter()
+            .map(|e| e.points.iter().map(|(theta, shape)| whiten(frame, *theta, shape, &e.sizes)).collect())
+            .collect();
+        Self { entries, points }
+    }
+}
+
+/// One family of a set at its nonlinear parameters.
+#[derive(Clone)]
+pub struct Member {
+    /// Place in the entries.
+    pub entry: usize,
+    /// Axes it acts on, where an open form was narrowed to one.
+    pub axis: Option<usize>,
+    /// Nonlinear parameters.
+    pub theta: Theta,
+    /// Their log prior density times the volume of their posterior.
+    pub log_occam: f64,
+    /// Standard errors of the nonlinear parameters.
+    pub theta_sigma: Theta,
+    point: Whitened,
+}
+
+/// A set of families.
+#[derive(Clone, Default)]
+pub struct Set {
+    /// Its members, in order of entries.
+    pub members: Vec<Member>,
+    /// Log evidence against nothing at the noise of the search, with all priors.
+    pub score: f64,
+}
+
+impl Set {
+    /// Key: which entries.
+    pub fn key(&self) -> Vec<usize> {
+        let mut key: Vec<usize> = self.members.iter().map(|m| m.entry).collect();
+        key.sort_unstable();
+        key
+    }
+
+    /// Columns chosen, for more to be added.
+    pub fn chosen(&self, frame: &Frame) -> Chosen<'_> {
+        let linear = self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| &m.point.columns).collect();
+        let fixed: Vec<&Column> =
+            self.members.iter().filter(|m| m.point.fixed).flat_map(|m| &m.point.columns).collect();
+        Chosen::new(frame, linear, &fixed)
+    }
+
+    /// Log evidence and priors at the noise of the frame.
+    pub fn weigh(&mut self, frame: &Frame, entries: &[Entry]) {
+        let priors: f64 = self.members.iter().map(|m| entries[m.entry].log_prior + m.log_occam).sum();
+        self.score = self.chosen(frame).log_evidence + priors;
+    }
+
+    /// Whiten the members again for another noise.
+    pub fn rewhiten(&mut self, scene: &Scene, frame: &Frame, entries: &[Entry]) {
+        for m in &mut self.members {
+            if let Some(point) = point_at(scene, frame, &entries[m.entry], &m.theta, m.axis) {
+                m.point = point;
+            }
+        }
+    }
+
+    /// Mean and covariance of all linear coefficients in their own units, members in order.
+    pub fn coefficients(&self, frame: &Frame, entries: &[Entry]) -> (DVector<f64>, DMatrix<f64>) {
+        let sizes: Vec<f64> =
+            self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| member_sizes(m, entries)).collect();
+        let (mean, covariance) = self.chosen(frame).posterior();
+        let scale = DMatrix::from_diagonal(&DVector::from_vec(sizes));
+        (&scale * mean, &scale * covariance * &scale)
+    }
+
+    /// The series of every member at the windows, ng, with the coefficients at this noise.
+    pub fn contributions(&self, scene: &Scene, frame: &Frame, entries: &[Entry]) -> Vec<Axes> {
+        let (mean, _) = self.coefficients(frame, entries);
+        let mut next = 0;
+        let n = scene.schedule.len();
+        self.members
+            .iter()
+            .map(|m| {
+                let mut sum: Axes = std::array::from_fn(|_| vec![0.0; n]);
+                let Some(shape) = shape_at(scene, &entries[m.entry], &m.theta) else { return sum };
+                let columns = shape.columns();
+                let picked: Vec<usize> = m.axis.map_or_else(|| (0..columns.len()).collect(), |a| vec![a]);
+                for j in picked {
+                    let factor = if m.point.fixed { 1.0 } else { mean[next] };
+                    next += usize::from(!m.point.fixed);
+                    for (total, series) in sum.iter_mut().zip(&columns[j]) {
+                        if let Some(series) = series {
+                            total.iter_mut().zip(series).for_each(|(t, x)| *t += factor * x);
+                        }
+                    }
+                }
+                sum
+            })
+            .collect()
+    }
+}
+
+impl Member {
+    /// Linear coefficients this member has.
+    pub fn linear(&self) -> usize {
+        if self.point.fixed { 0 } else { self.point.columns.len() }
+    }
+}
+
+fn member_sizes(m: &Member, entries: &[Entry]) -> Vec<f64> {
+    let sizes = &entries[m.entry].sizes;
+    m.axis.map_or_else(|| sizes.clone(), |a| vec![sizes[a]])
+}
+
+fn shape_at(scene: &Scene, entry: &Entry, theta: &Theta) -> Option<Shape> {
+    match entry.effect() {
+        Some(effect) => (effect.signature)(scene, theta),
+        None => Some(entry.points[0].1.clone()),
+    }
+}
+
+fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, theta: &Theta, axis: Option<usize>) -> Option<Whitened> {
+    let known = entry.points.iter().find(|(t, _)| t == theta);
+    let mut point = match known {
+        Some((_, shape)) => whiten(frame, *theta, shape, &entry.sizes),
+        None => whiten(frame, *theta, &shape_at(scene, entry, theta)?, &entry.sizes),
+    };
+    if let Some(axis) = axis {
+        point.columns = vec![point.columns.swap_remove(axis)];
+    }
+    Some(point)
+}
+
+/// The best way to add one entry to a chosen set: the score gained with priors, and the member.
+pub fn best_of_entry(bank: &Bank, index: usize, chosen: &Chosen) -> (f64, Member) {
+    let entry = &bank.entries[index];
+    let gains: Vec<f64> = bank.points[index]
+        .iter()
+        .map(|p| if p.fixed { chosen.gain_fixed(&p.columns[0]) } else { chosen.gain(&p.columns) })
+        .collect();
+    let best = (0..gains.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b])).unwrap_or(0);
+    let top = gains[best];
+    let marginal = top + gains.iter().map(|g| (g - top).exp()).sum::<f64>().ln() - (gains.len() as f64).ln();
+    let mut member = Member {
+        entry: index,
+        axis: None,
+        theta: bank.points[index][best].theta,
+        log_occam: marginal - top,
+        theta_sigma: [0.0; 2],
+        point: bank.points[index][best].clone(),
+    };
+    let mut gain = marginal;
+    if matches!(entry.family, Family::Open(_)) && matches!(entry.points[0].1, Shape::Scalar(_)) {
+        // All axes, or one of them: a quarter each.
+        let fourth = 4.0_f64.ln();
+        gain -= fourth;
+        member.log_occam -= fourth;
+        for axis in 0..3 {
+            let single = chosen.gain(&bank.points[index][0].columns[axis..=axis]) - fourth;
+            if single > gain {
+                gain = single;
+                member.axis = Some(axis);
+                member.point.columns = vec![bank.points[index][0].columns[axis].clone()];
+            }
+        }
+    }
+    (gain + entry.log_prior, member)
+}
+
+/// Grow sets from `seeds` by one member each at a time, over the entries of `allowed`.
+pub fn grow(frame: &Frame, bank: &Bank, allowed: &[usize], seeds: Vec<Set>, size_max: usize) -> Vec<Set> {
+    let mut found: Vec<Set> = seeds.clone();
+    let mut layer = seeds;
+    for _ in 0..size_max {
+        let mut next: Vec<Set> = Vec::new();
+        for set in layer.iter().take(BEAM) {
+            let chosen = set.chosen(frame);
+            for &index in allowed {
+                if set.members.iter().any(|m| m.entry == index) || set.members.len() >= size_max {
+                    continue;
+                }
+                let (gain, member) = best_of_entry(bank, index, &chosen);
+                let mut grown = set.clone();
+                grown.members.push(member);
+                grown.members.sort_by_key(|m| m.entry);
+                grown.score = set.score + gain;
+                next.push(grown);
+            }
+        }
+        next.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let mut keys: Vec<Vec<usize>> = Vec::new();
+        next.retain(|s| {
+            let key = s.key();
+            let new = !keys.contains(&key);
+            keys.push(key);
+            new
+        });
+        let best = found.iter().map(|s| s.score).fold(f64::NEG_INFINITY, f64::max);
+        next.truncate(FINALISTS.max(BEAM) * 2);
+        let alive = next.first().is_some_and(|s| s.score > best - 2.0);
+        found.extend(next.iter().cloned());
+        if !alive {
+            break;
+        }
+        layer = next;
+    }
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    found
+}
+
+/// Refine the nonlinear parameters of a set at one noise, and weigh it with the volume of their posterior.
+pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
+    for i in 0..set.members.len() {
+        let entry = &entries[set.members[i].entry];
+        let Some(effect) = entry.effect() else { continue };
+        let free: Vec<usize> = (0..effect.nonlinear.len()).filter(|j| effect.nonlinear[*j].step > 0.0).collect();
+        if free.is_empty() {
+            continue;
+        }
+        let others = Set {
+            members: set.members.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, m)| m.clone()).collect(),
+            score: 0.0,
+        };
+        let chosen = others.chosen(frame);
+        let mut theta = set.members[i].theta;
+        let gain = |theta: &Theta| -> f64 {
+            let Some(shape) = (effect.signature)(scene, theta) else { return f64::NEG_INFINITY };
+            let point = whiten(frame, *theta, &shape, &entry.sizes);
+            if point.fixed { chosen.gain_fixed(&point.columns[0]) } else { chosen.gain(&point.columns) }
+        };
+        let start: Vec<f64> = free.iter().map(|j| theta[*j]).collect();
+        let steps: Vec<f64> = free.iter().map(|j| effect.nonlinear[*j].step).collect();
+        let place = |p: &[f64]| {
+            let mut t = theta;
+            free.iter().zip(p).for_each(|(j, x)| t[*j] = *x);
+            t
+        };
+        let before = gain(&theta);
+        let best = nelder_mead(&start, &steps, 60, |p| -gain(&place(p)));
+        let refined = place(&best);
+        let peak = gain(&refined);
+        if peak >= before {
+            theta = refined;
+        }
+        let peak = peak.max(before);
+        if !peak.is_finite() {
+            continue;
+        }
+        let (log_occam, sigma) = volume(&gain, &theta, &free, effect, entry.log_volume, peak);
+        if let Some(point) = point_at(scene, frame, entry, &theta, None) {
+            let m = &mut set.members[i];
+            (m.theta, m.log_occam, m.theta_sigma, m.point) = (theta, log_occam, sigma, point);
+        }
+    }
+    set.weigh(frame, entries);
+}
+
+/// Laplace volume of the nonlinear parameters around their peak against their prior's, and their standard errors.
+fn volume(
+    gain: &impl Fn(&Theta) -> f64,
+    theta: &Theta,
+    free: &[usize],
+    effect: &Effect,
+    log_volume: f64,
+    peak: f64,
+) -> (f64, Theta) {
+    let n = free.len();
+    let mut h: Vec<f64> = free.iter().map(|j| effect.nonlinear[*j].step * 0.1).collect();
+    // A wall on one side (a lag cannot be negative) is mirrored: the fall is counted on the open side.
+    let gain = |t: &Theta| {
+        let there = gain(t);
+        if there.is_finite() {
+            return there;
+        }
+        gain(&[2.0 * theta[0] - t[0], 2.0 * theta[1] - t[1]])
+    };
+    // Steps at which the evidence falls by about one half: neither rounding nor the far side.
+    for (a, j) in free.iter().enumerate() {
+        for _ in 0..14 {
+            let at = |sign: f64| {
+                let mut t = *theta;
+                t[*j] += sign * h[a];
+                gain(&t)
+            };
+            let drop = peak - 0.5 * (at(1.0) + at(-1.0));
+            if !drop.is_finite() || drop > 1.5 {
+                h[a] *= 0.6;
+            } else if drop < 0.25 {
+                h[a] *= 1.5;
+            } else {
+                break;
+            }
+        }
+    }
+    let at = |shifts: &[(usize, f64)]| {
+        let mut t = *theta;
+        shifts.iter().for_each(|(a, s)| t[free[*a]] += s * h[*a]);
+        gain(&t)
+    };
+    let mut hessian = DMatrix::zeros(n, n);
+    for a in 0..n {
+        hessian[(a, a)] = (2.0 * peak - at(&[(a, 1.0)]) - at(&[(a, -1.0)])).clamp(0.05, 1e6) / (h[a] * h[a]);
+        for b in 0..a {
+            let mixed = (at(&[(a, 1.0), (b, -1.0)]) + at(&[(a, -1.0), (b, 1.0)])
+                - at(&[(a, 1.0), (b, 1.0)])
+                - at(&[(a, -1.0), (b, -1.0)]))
+                / (4.0 * h[a] * h[b]);
+            let bound = 0.95 * (hessian[(a, a)] * hessian[(b, b)]).sqrt();
+            let mixed = if mixed.is_finite() { mixed.clamp(-bound, bound) } else { 0.0 };
+            hessian[(a, b)] = mixed;
+            hessian[(b, a)] = mixed;
+        }
+    }
+    let mut sigma = [0.0; 2];
+    let Some(inverse) = hessian.clone().try_inverse() else { return (0.0, sigma) };
+    for (a, j) in free.iter().enumerate() {
+        sigma[*j] = inverse[(a, a)].max(0.0).sqrt();
+    }
+    let log_laplace = 0.5 * (n as f64 * std::f64::consts::TAU.ln() - hessian.determinant().max(1e-300).ln());
+    ((log_laplace - log_volume).min(0.0), sigma)
+}
+
+/// A set with the noise fitted to what it leaves.
+pub struct Weighed {
+    /// The set, refined at its own noise.
+    pub set: Set,
+    /// Noise of its residual.
+    pub noise: [AxisNoise; 3],
+    /// Log posterior, up to a constant common to all sets of a case.
+    pub log_posterior: f64,
+}
+
+/// Residual of a set at the noise of a frame.
+pub fn residual(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) -> Axes {
+    let mut left = scene.residual_ng.clone();
+    for part in set.contributions(scene, frame, entries) {
+        for (total, series) in left.iter_mut().zip(&part) {
+            total.iter_mut().zip(series).for_each(|(t, x)| *t -= x);
+        }
+    }
+    left
+}
+
+/// Fit the noise of all axes to a residual.
+pub fn fit_noise(
+    scene: &Scene,
+    residual_ng: &Axes,
+    start: Option<&[AxisNoise; 3]>,
+    evaluations: usize,
+) -> [AxisNoise; 3] {
+    std::array::from_fn(|k| {
+        noise::fit(&residual_ng[k], &scene.schedule, &scene.activity[k], start.map(|s| &s[k]), evaluations).noise
+    })
+}
+
+/// Weigh a set with its own noise: alternately noise and coefficients, `rounds` times.
+pub fn weigh_with_own_noise(
+    scene: &Scene,
+    entries: &[Entry],
+    set: &Set,
+    start: &[AxisNoise; 3],
+    rounds: usize,
+    evaluations: usize,
+) -> Weighed {
+    let mut noise = *start;
+    let mut set = set.clone();
+    let mut frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    set.rewhiten(scene, &frame, entries);
+    for _ in 0..rounds {
+        noise = fit_noise(scene, &residual(scene, &frame, entries, &set), Some(&noise), evaluations);
+        frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+        set.rewhiten(scene, &frame, entries);
+    }
+    refine(scene, &frame, entries, &mut set);
+    let log_posterior = frame.log_null + set.score + noise.iter().map(noise::log_prior).sum::<f64>();
+    Weighed { set, noise, log_posterior }
+}

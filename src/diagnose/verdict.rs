@@ -1,0 +1,414 @@
+//! From weighed hypotheses to what is said: consistent, explained, ambiguous or unexplained, with its figures.
+
+use super::answer::{
+    Alternative, Diagnosis, EffectAnswer, Fit, FitLevel, Hypothesis, Located, ParameterAnswer, UpperLimit, Verdict,
+};
+use super::catalogue::Effect;
+use super::design::{Chosen, Column, Frame};
+use super::locate;
+use super::model::{self, MemberFit, rms};
+use super::scene::{Axes, Scene};
+use super::search::{self, Entry, Family, Set, Weighed};
+use super::solve::{Library, Solution};
+
+/// Log odds by which an open form must beat the best listed set.
+const OPEN_MARGIN: f64 = 3.0;
+/// Log odds within which another set is as good, and the smaller of two nested sets is preferred.
+const EQUAL: f64 = 2.3;
+/// Posterior below which an alternative is not mentioned.
+const MENTION: f64 = 0.004;
+/// A remaining autocorrelation this unlikely makes the errors wider.
+const WHITENESS_P: f64 = 1e-3;
+
+/// What the answer rests on.
+struct Best<'a> {
+    weighed: &'a Weighed,
+    frame: Frame,
+    set: Set,
+    fits: Vec<MemberFit>,
+    contributions: Vec<Axes>,
+}
+
+/// Names of a set, for people and for `cannot_tell_apart`.
+fn ids(library: &Library, set: &Set) -> Vec<String> {
+    set.members
+        .iter()
+        .map(|m| match library.entries[m.entry].family {
+            Family::Listed(effect) => effect.id.to_string(),
+            Family::Open(i) => library.atoms[i].formula.clone(),
+        })
+        .collect()
+}
+
+fn effect_of<'a>(entries: &'a [Entry], set: &Set, i: usize) -> Option<&'static Effect> {
+    match entries[set.members[i].entry].family {
+        Family::Listed(effect) => Some(effect),
+        Family::Open(_) => None,
+    }
+}
+
+/// The answer, the claimed series at the windows, and the ladder of evidence.
+pub fn conclude(
+    scene: &Scene,
+    library: &Library,
+    solution: &Solution,
+    probability: f64,
+    claim: f64,
+) -> (Diagnosis, Axes, Vec<(String, f64)>) {
+    let null = solution.null.log_posterior;
+    let mut ladder: Vec<(String, f64)> = solution
+        .listed
+        .iter()
+        .chain(&solution.open)
+        .map(|w| (ids(library, &w.set).join(" + "), w.log_posterior - null))
+        .collect();
+    ladder.push(("nothing".into(), 0.0));
+    ladder.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut notes = Vec::new();
+    let listed = credible(scene, library, &solution.listed, &mut notes);
+    let top = |sets: &[&Weighed]| sets.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior);
+    let open: Vec<&Weighed> = solution.open.iter().collect();
+    let refused = solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior) - top(&listed) > OPEN_MARGIN;
+    let open_wins = top(&open) - top(&listed).max(null) > OPEN_MARGIN;
+    let claimed = probability <= claim
+        && top(&listed).max(top(&open)).max(solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior))
+            > null;
+    let verdict = match (claimed, open_wins || refused) {
+        (false, _) => Verdict::Consistent,
+        (true, true) => Verdict::Unexplained,
+        (true, false) => Verdict::Explained,
+    };
+    let chosen: Option<&Weighed> = match verdict {
+        Verdict::Consistent => None,
+        Verdict::Unexplained if open_wins => open.first().copied(),
+        Verdict::Unexplained => solution.listed.first(),
+        _ => Some(simplest(&listed)),
+    };
+    let mut answer = empty(scene, verdict, probability);
+    answer.located.covariates =
+        locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
+    let null_frame = Frame::new(&solution.null.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let Some(weighed) = chosen else {
+        answer.notes = notes;
+        answer.upper_limits = upper_limits(scene, library, &null_frame, &Set::default());
+        answer.fit = Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), &mut answer.notes).0);
+        return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder);
+    };
+    let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let mut set = weighed.set.clone();
+    set.rewhiten(scene, &frame, &library.entries);
+    let (fit, inflation) = fit(scene, library, &frame, weighed, &set, &mut notes);
+    let fits = model::parameters(scene, &frame, &library.entries, &set, inflation);
+    let contributions = set.contributions(scene, &frame, &library.entries);
+    let best = Best { weighed, frame, set, fits, contributions };
+    answer.fit = Some(fit);
+    let signal = sum(scene, &best.contributions);
+    let covariates = std::mem::take(&mut answer.located.covariates);
+    answer.located = Located {
+        covariates,
+        per_orbit_lines: locate::lines(scene, &best.frame),
+        ..locate::of_signal(scene, &signal, why_here(&best))
+    };
+    answer.upper_limits = upper_limits(scene, library, &best.frame, &best.set);
+    match verdict {
+        Verdict::Unexplained => answer.hypothesis = Some(hypothesis(library, &best, &listed, open_wins)),
+        _ => name(&mut answer, scene, library, &best, &listed),
+    }
+    answer.notes = notes;
+    (answer, signal, ladder)
+}
+
+fn empty(scene: &Scene, verdict: Verdict, probability: f64) -> Diagnosis {
+    Diagnosis {
+        schema: "oare.diagnosis/1".into(),
+        case: scene.case.header.id.clone(),
+        verdict,
+        false_alarm_probability: probability,
+        located: Located { frame: "body".into(), ..Located::default() },
+        effects: Vec::new(),
+        alternatives: Vec::new(),
+        hypothesis: None,
+        fit: None,
+        upper_limits: Vec::new(),
+        separating_observation: None,
+        cannot_tell_apart: Vec::new(),
+        arcs: Vec::new(),
+        notes: Vec::new(),
+    }
+}
+
+/// Listed sets whose sizes can be believed; the others are refused, with the reason.
+fn credible<'a>(scene: &Scene, library: &Library, sets: &'a [Weighed], notes: &mut Vec<String>) -> Vec<&'a Weighed> {
+    let mut kept = Vec::new();
+    for w in sets {
+        let frame = Frame::new(&w.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+        let mut set = w.set.clone();
+        set.rewhiten(scene, &frame, &library.entries);
+        let (mean, _) = set.coefficients(&frame, &library.entries);
+        let mut next = 0;
+        let mut reason = None;
+        for (i, m) in set.members.iter().enumerate() {
+            let Some(effect) = effect_of(&library.entries, &set, i) else { continue };
+            for (k, l) in effect.linear.iter().enumerate().take(m.linear()) {
+                if mean[next + k].abs() > l.size_max {
+                    reason = Some(format!(
+                        "{} is refused: it would need {} = {:.3} {}, and {} is the most that can be believed",
+                        effect.id,
+                        l.name,
+                        mean[next + k],
+                        l.unit,
+                        l.size_max
+                    ));
+                }
+            }
+            next += m.linear();
+        }
+        match reason {
+            None => kept.push(w),
+            Some(reason) if !notes.contains(&reason) && notes.len() < 3 => notes.push(reason),
+            Some(_) => {}
+        }
+    }
+    kept
+}
+
+/// The smallest set that is part of the best one and as good.
+fn simplest<'a>(listed: &[&'a Weighed]) -> &'a Weighed {
+    let best = listed[0];
+    let key = best.set.key();
+    let nested = |w: &&&Weighed| w.set.members.len() < key.len() && w.set.key().iter().all(|e| key.contains(e));
+    listed
+        .iter()
+        .filter(|w| best.log_posterior - w.log_posterior < EQUAL)
+        .filter(nested)
+        .min_by_key(|w| w.set.members.len())
+        .copied()
+        .unwrap_or(best)
+}
+
+/// Whether one set holds the other.
+fn is_nested(a: &Set, b: &Set) -> bool {
+    let (a, b) = (a.key(), b.key());
+    a.iter().all(|e| b.contains(e)) || b.iter().all(|e| a.contains(e))
+}
+
+fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Best, listed: &[&Weighed]) {
+    let _ = scene;
+    let top = listed[0].log_posterior;
+    let total: f64 = listed.iter().map(|w| (w.log_posterior - top).exp()).sum();
+    let posterior = |w: &Weighed| (w.log_posterior - top).exp() / total;
+    let key = best.set.key();
+    answer.effects = effects(library, best, |entry| {
+        listed.iter().filter(|w| w.set.key().contains(&entry)).map(|w| posterior(w)).sum()
+    });
+    let others: Vec<&&Weighed> = listed.iter().filter(|w| w.set.key() != key).collect();
+    let rivals: Vec<&&&Weighed> = others
+        .iter()
+        .filter(|w| best.weighed.log_posterior - w.log_posterior < EQUAL && !is_nested(&w.set, &best.set))
+        .collect();
+    if !rivals.is_empty() {
+        answer.verdict = Verdict::Ambiguous;
+        answer.cannot_tell_apart.push(ids(library, &best.set));
+        answer.cannot_tell_apart.extend(rivals.iter().map(|w| ids(library, &w.set)));
+    }
+    answer.alternatives = others
+        .iter()
+        .filter(|w| posterior(w) > MENTION && !rivals.iter().any(|r| r.set.key() == w.set.key()))
+        .filter(|w| !is_nested(&w.set, &best.set) || w.log_posterior > best.weighed.log_posterior - EQUAL)
+        .map(|w| Alternative {
+            effects: ids(library, &w.set),
+            posterior: posterior(w),
+            delta_bic: 2.0 * (best.weighed.log_posterior - w.log_posterior),
+        })
+        .collect();
+}
+
+fn effects(library: &Library, best: &Best, posterior: impl Fn(usize) -> f64) -> Vec<EffectAnswer> {
+    let mut out = Vec::new();
+    for (i, m) in best.set.members.iter().enumerate() {
+        let Some(effect) = effect_of(&library.entries, &best.set, i) else { continue };
+        out.push(EffectAnswer {
+            id: effect.id.into(),
+            name: effect.name.into(),
+            posterior: posterior(m.entry).min(1.0),
+            parameters: best.fits[i]
+                .parameters
+                .iter()
+                .map(|p| ParameterAnswer { name: p.name.into(), value: p.value, sigma: p.sigma, unit: p.unit.into() })
+                .collect(),
+            axis: best.fits[i].axis.clone(),
+            why: effect.why.into(),
+            rms_ng: Some(std::array::from_fn(|k| rms(&best.contributions[i][k]))),
+        });
+    }
+    out.sort_by(|a, b| b.posterior.total_cmp(&a.posterior));
+    out
+}
+
+fn why_here(best: &Best) -> &'static str {
+    let onset = best.fits.iter().any(|f| f.parameters.iter().any(|p| p.name == "onset_s"));
+    if onset { "onset" } else { "largest part of the mismatch" }
+}
+
+fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins: bool) -> Hypothesis {
+    let near = |w: &&Weighed| {
+        format!(
+            "{} lacks {:.1} in log evidence",
+            ids(library, &w.set).join(" + "),
+            best.weighed.log_posterior - w.log_posterior
+        )
+    };
+    let fails = listed.iter().take(3).map(near).collect::<Vec<_>>().join("; ");
+    if !open_wins {
+        return Hypothesis {
+            formula: "none".into(),
+            axis: "x, y, z".into(),
+            unit: "ng".into(),
+            location: format!("No credible set of listed effects. {fails}"),
+        };
+    }
+    let mut formula = Vec::new();
+    let mut axis = Vec::new();
+    let mut location = Vec::new();
+    for (i, m) in best.set.members.iter().enumerate() {
+        let Family::Open(atom) = library.entries[m.entry].family else { continue };
+        let amplitudes: Vec<String> =
+            best.fits[i].parameters.iter().map(|p| format!("{:.1}({:.1})", p.value, p.sigma)).collect();
+        formula.push(format!(
+            "[{}] x {}, scaled to unit deviation",
+            amplitudes.join(", "),
+            library.atoms[atom].formula
+        ));
+        axis.push(m.axis.map_or("x, y, z", |a| ["x", "y", "z"][a]));
+        location.push(library.atoms[atom].location);
+    }
+    let failing = if fails.is_empty() { String::new() } else { format!(" Near catalogue effects fail: {fails}.") };
+    Hypothesis {
+        formula: formula.join(" + "),
+        axis: axis.join("; "),
+        unit: "ng".into(),
+        location: format!("It lives in {}.{failing}", location.join(" and ")),
+    }
+}
+
+fn covariate(library: &Library, entry: usize) -> String {
+    match library.entries[entry].family {
+        Family::Listed(effect) => effect.id.to_string(),
+        Family::Open(i) => library.atoms[i].covariate.to_string(),
+    }
+}
+
+fn sum(scene: &Scene, parts: &[Axes]) -> Axes {
+    let mut total: Axes = std::array::from_fn(|_| vec![0.0; scene.schedule.len()]);
+    for part in parts {
+        for (t, p) in total.iter_mut().zip(part) {
+            t.iter_mut().zip(p).for_each(|(a, b)| *a += b);
+        }
+    }
+    total
+}
+
+/// Before and after, and by how much the errors must be widened.
+fn fit(
+    scene: &Scene,
+    library: &Library,
+    frame: &Frame,
+    weighed: &Weighed,
+    set: &Set,
+    notes: &mut Vec<String>,
+) -> (Fit, f64) {
+    let entries = &library.entries;
+    let left = search::residual(scene, frame, entries, set);
+    let after = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &left);
+    let dof = 3.0 * (scene.schedule.len() as f64 - 1.0);
+    let level = |axes: &Axes, f: &Frame, used: f64| FitLevel {
+        rms_ng: std::array::from_fn(|k| rms(&axes[k])),
+        whitened_chi2_per_dof: f.data.dot(&f.data) / (dof - used),
+    };
+    let used: f64 = set.members.iter().map(|m| m.linear() as f64).sum();
+    let mut inflation = 1.0_f64;
+    for k in 0..3 {
+        let (p, ratio) = whiteness(&after.data.projected(k, &after));
+        if p < WHITENESS_P {
+            inflation = inflation.max(ratio.sqrt());
+            notes.push(format!(
+                "the whitened residual of axis {} is not white (p = {p:.1e}): errors are widened by {:.2}",
+                ["x", "y", "z"][k],
+                ratio.sqrt()
+            ));
+        }
+    }
+    let held_out = model::held_out(scene, frame, entries, set, &weighed.noise);
+    if !set.members.is_empty() && held_out.log_score_gain <= 0.0 {
+        notes.push("the fit does not predict blocks it has not seen".into());
+    }
+    let fit = Fit {
+        noise_floor_ng: std::array::from_fn(|k| weighed.noise[k].rms_ng()),
+        before: level(&scene.residual_ng, frame, 0.0),
+        after: level(&left, &after, used),
+        held_out,
+    };
+    (fit, inflation)
+}
+
+/// Ljung-Box over twenty lags: its p value, and the statistic against what is expected.
+fn whiteness(x: &[f64]) -> (f64, f64) {
+    const LAGS: usize = 20;
+    let n = x.len() as f64;
+    let energy: f64 = x.iter().map(|v| v * v).sum();
+    let q: f64 = (1..=LAGS)
+        .map(|lag| {
+            let r: f64 = x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum::<f64>() / energy;
+            r * r / (n - lag as f64)
+        })
+        .sum::<f64>()
+        * n
+        * (n + 2.0);
+    // Wilson and Hilferty 1931: the cube root of a chi square is nearly normal.
+    let k = LAGS as f64;
+    let z = ((q / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
+    (0.5 * statrs::function::erf::erfc(z / std::f64::consts::SQRT_2), (q / k).max(1.0))
+}
+
+/// 95 % limits on the size of every listed effect that is not claimed, beside what is.
+fn upper_limits(scene: &Scene, library: &Library, frame: &Frame, set: &Set) -> Vec<UpperLimit> {
+    let chosen = set.chosen(frame);
+    let n = scene.schedule.len() as f64;
+    let mut out = Vec::new();
+    for (index, entry) in library.entries[..library.listed].iter().enumerate() {
+        let Family::Listed(effect) = entry.family else { continue };
+        if set.members.iter().any(|m| m.entry == index) {
+            continue;
+        }
+        // A dozen of the starting points: the loosest of them is the limit.
+        let stride = entry.points.len().div_ceil(12);
+        let limits = entry.points.iter().step_by(stride).map(|(_, shape)| {
+            let raws = shape.columns();
+            let scales: Vec<f64> = raws
+                .iter()
+                .map(|raw| (raw.iter().flatten().map(|s| rms(s).powi(2)).sum::<f64>()).sqrt().max(1e-30))
+                .collect();
+            let columns: Vec<Column> = raws.iter().zip(&scales).map(|(raw, s)| frame.column(raw, 300.0 / s)).collect();
+            let (value, sigma) = conditional(&chosen, &columns);
+            value + 1.645 * sigma
+        });
+        let limit_ng = 300.0 * limits.fold(0.0, f64::max);
+        if limit_ng.is_finite() && n > 0.0 {
+            out.push(UpperLimit { id: effect.id.into(), limit_ng: (limit_ng * 100.0).round() / 100.0 });
+        }
+    }
+    out
+}
+
+/// Size and standard error of the largest of several columns beside those chosen, in units of their prior.
+fn conditional(chosen: &Chosen, columns: &[Column]) -> (f64, f64) {
+    let mut worst = (0.0_f64, 0.0_f64);
+    for column in columns {
+        let (a, y) = chosen.left_in(column);
+        let (value, sigma) = (y / (a + 1.0), (a + 1.0).sqrt().recip());
+        if value.abs() + 1.645 * sigma > worst.0 + 1.645 * worst.1 {
+            worst = (value.abs(), sigma);
+        }
+    }
+    worst
+}

@@ -1,0 +1,303 @@
+//! The products as JSON: the border between the nouns of the pipeline and everybody's programs.
+//!
+//! The names are those of `windows.csv`; accelerations in ng with three decimals, an unknown value is `null`.
+
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use super::message::{Body, Message};
+use crate::pipeline::calibration::Anomaly;
+use crate::pipeline::product::{BodyVector, Product};
+use crate::telemetry::{AccRecord, Event, Range};
+use crate::units::{Clock, MissionTime};
+
+/// A clock in the three ways people read it.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Time {
+    /// Instrument clock, s since power-on.
+    pub clock_s: f64,
+    /// Mission elapsed time, s since lift-off.
+    pub met_s: f64,
+    /// UTC, RFC 3339.
+    pub utc: String,
+}
+
+impl Time {
+    /// A clock of a mission.
+    pub fn new(mission: &MissionTime, clock: Clock) -> Self {
+        let clock_s = clock.seconds();
+        Self { clock_s, met_s: decimals(mission.met_s(clock_s), 1), utc: utc(mission, clock) }
+    }
+}
+
+/// RFC 3339 with milliseconds.
+pub fn utc(mission: &MissionTime, clock: Clock) -> String {
+    format!("{:.3}", mission.utc(clock.seconds()))
+}
+
+fn decimals(value: f64, decimals: i32) -> f64 {
+    let scale = 10f64.powi(decimals);
+    // Adding zero turns the negative zero into zero.
+    (value * scale).round() / scale + 0.0
+}
+
+/// One window, with the names of `windows.csv`.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+#[allow(missing_docs, reason = "the names are the documentation: they are those of windows.csv")]
+pub struct Window {
+    pub window_start_clock_s: f64,
+    pub met_s: f64,
+    pub utc: String,
+    pub ax_ng: Option<f64>,
+    pub ay_ng: Option<f64>,
+    pub az_ng: Option<f64>,
+    pub sigma_ax_ng: Option<f64>,
+    pub sigma_ay_ng: Option<f64>,
+    pub sigma_az_ng: Option<f64>,
+    pub sigma_sys_ax_ng: Option<f64>,
+    pub sigma_sys_ay_ng: Option<f64>,
+    pub sigma_sys_az_ng: Option<f64>,
+    pub mean_ax_ng: Option<f64>,
+    pub mean_ay_ng: Option<f64>,
+    pub mean_az_ng: Option<f64>,
+    pub q_x: Option<f64>,
+    pub q_y: Option<f64>,
+    pub q_z: Option<f64>,
+    pub trim_x: Option<f64>,
+    pub trim_y: Option<f64>,
+    pub trim_z: Option<f64>,
+    pub range_x: Option<&'static str>,
+    pub range_y: Option<&'static str>,
+    pub range_z: Option<&'static str>,
+    pub samples: u16,
+    pub temperature_c: Option<f64>,
+    pub mode: &'static str,
+    pub quality: String,
+    pub calibration: u32,
+    pub revision: String,
+    pub known_since_clock_s: f64,
+}
+
+/// The components of an acceleration, or three unknowns.
+fn components(vector: Option<BodyVector>) -> [Option<f64>; 3] {
+    vector.map_or([None; 3], |BodyVector(ng)| ng.map(|ng| Some(decimals(ng, 3))))
+}
+
+impl Window {
+    /// The wire form of a product.
+    pub fn new(mission: &MissionTime, product: &Product) -> Self {
+        let acceleration = product.acceleration.as_ref();
+        let [ax_ng, ay_ng, az_ng] = components(acceleration.map(|a| a.trimmed_ng));
+        let [sigma_ax_ng, sigma_ay_ng, sigma_az_ng] = components(acceleration.map(|a| a.sigma_ng));
+        let [sigma_sys_ax_ng, sigma_sys_ay_ng, sigma_sys_az_ng] = components(acceleration.map(|a| a.sigma_sys_ng));
+        let [mean_ax_ng, mean_ay_ng, mean_az_ng] = components(acceleration.map(|a| a.mean_ng));
+        let [q_x, q_y, q_z] = product.q.map(|q| q.map(|q| decimals(q, 4)));
+        let [trim_x, trim_y, trim_z] = product.trim.map(|trim| trim.map(|trim| decimals(trim, 4)));
+        let [range_x, range_y, range_z] = product.range.map(|range| range.map(Range::letter));
+        let Time { clock_s, met_s, utc } = Time::new(mission, product.start);
+        Self {
+            window_start_clock_s: clock_s,
+            met_s,
+            utc,
+            ax_ng,
+            ay_ng,
+            az_ng,
+            sigma_ax_ng,
+            sigma_ay_ng,
+            sigma_az_ng,
+            sigma_sys_ax_ng,
+            sigma_sys_ay_ng,
+            sigma_sys_az_ng,
+            mean_ax_ng,
+            mean_ay_ng,
+            mean_az_ng,
+            q_x,
+            q_y,
+            q_z,
+            trim_x,
+            trim_y,
+            trim_z,
+            range_x,
+            range_y,
+            range_z,
+            samples: product.samples,
+            temperature_c: product.temperature_c.map(|c| decimals(c, 3)),
+            mode: product.mode.word(),
+            quality: product.quality.to_string(),
+            calibration: product.calibration,
+            revision: product.revision.to_string(),
+            known_since_clock_s: product.known_since.seconds(),
+        }
+    }
+}
+
+/// One second of raw samples.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct RawSecond {
+    /// Time of the first sample.
+    #[serde(flatten)]
+    pub time: Time,
+    /// What the instrument was doing.
+    pub mode: &'static str,
+    /// Quiet asserted.
+    pub quiet: bool,
+    /// The table was moving.
+    pub table_moving: bool,
+    /// A sample is at the rail.
+    pub at_rail: bool,
+    /// Range of X, Y, Z (OARE axes) as reported.
+    pub ranges: [&'static str; 3],
+    /// Sensor temperature, C.
+    pub temperature_c: f64,
+    /// Ten samples of X, Y, Z (OARE axes), 0.1 s apart, counts.
+    pub counts: [[i16; 3]; 10],
+}
+
+impl RawSecond {
+    /// The wire form of a record.
+    pub fn new(mission: &MissionTime, record: &AccRecord) -> Self {
+        Self {
+            time: Time::new(mission, record.clock),
+            mode: record.mode.word(),
+            quiet: record.quiet,
+            table_moving: record.table_moving,
+            at_rail: record.at_rail,
+            ranges: record.ranges.map(Range::letter),
+            temperature_c: decimals(f64::from(record.temperature_c), 3),
+            counts: record.counts,
+        }
+    }
+}
+
+/// An event of the instrument.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct EventWire {
+    /// When.
+    #[serde(flatten)]
+    pub time: Time,
+    /// Code on the wire.
+    pub code: u16,
+    /// Its name; `other` for a code without one.
+    pub event: &'static str,
+    /// Its argument.
+    pub argument: u32,
+    /// Its text.
+    pub text: String,
+}
+
+impl EventWire {
+    /// The wire form of an event.
+    pub fn new(mission: &MissionTime, event: &Event) -> Self {
+        const NAMES: [&str; 14] = [
+            "other",
+            "power_on",
+            "lift_off",
+            "quiet_on",
+            "quiet_off",
+            "reentry_asserted",
+            "reentry_cancelled",
+            "bias_start",
+            "bias_end",
+            "scale_start",
+            "scale_end",
+            "scale_aborted",
+            "range_change",
+            "shutdown",
+        ];
+        let code = event.code.code();
+        let name = NAMES.get(usize::from(code)).copied().unwrap_or(NAMES[0]);
+        let time = Time::new(mission, event.clock);
+        Self { time, code, event: name, argument: event.argument, text: event.text.clone() }
+    }
+}
+
+/// A span that is not covered.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Gap {
+    /// First second missing, clock s.
+    pub from_clock_s: f64,
+    /// First second that is there again, clock s.
+    pub to_clock_s: f64,
+    /// UTC of `from_clock_s`.
+    pub from_utc: String,
+    /// UTC of `to_clock_s`.
+    pub to_utc: String,
+}
+
+impl Gap {
+    /// The wire form of a gap.
+    pub fn new(mission: &MissionTime, from: Clock, to: Clock) -> Self {
+        Self {
+            from_clock_s: from.seconds(),
+            to_clock_s: to.seconds(),
+            from_utc: utc(mission, from),
+            to_utc: utc(mission, to),
+        }
+    }
+}
+
+/// An anomaly, as in `anomalies.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct AnomalyWire {
+    /// Kind, as in `anomalies.json`.
+    pub kind: &'static str,
+    /// From when, clock s.
+    pub from_clock_s: f64,
+    /// Until when, clock s.
+    pub to_clock_s: f64,
+    /// OARE axes concerned.
+    pub axes: Vec<&'static str>,
+    /// Size, in `unit`.
+    pub value: f64,
+    /// Its standard error.
+    pub sigma: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+    /// One sentence for an operator.
+    pub sentence: String,
+}
+
+impl AnomalyWire {
+    /// The wire form of an anomaly.
+    pub fn new(anomaly: &Anomaly) -> Self {
+        Self {
+            kind: anomaly.kind.word(),
+            from_clock_s: anomaly.from.seconds(),
+            to_clock_s: anomaly.to.seconds(),
+            axes: anomaly.axes.iter().map(|axis| axis.letter()).collect(),
+            value: anomaly.value,
+            sigma: anomaly.sigma,
+            unit: anomaly.unit,
+            sentence: anomaly.sentence.clone(),
+        }
+    }
+}
+
+/// The JSON members of a message, its type first, without the braces.
+pub fn members(kind: &str, value: &impl Serialize) -> String {
+    let json = serde_json::to_string(value).expect("a wire type has text keys and no failing parts");
+    let inside = json.trim_start_matches('{').strip_suffix('}').unwrap_or(&json);
+    match inside {
+        "" => format!("\"type\":\"{kind}\""),
+        inside => format!("\"type\":\"{kind}\",{inside}"),
+    }
+}
+
+/// The JSON members of a message, made once and shared by all who read it.
+pub fn message_members<'a>(mission: &MissionTime, message: &'a Message) -> &'a [u8] {
+    message.text.get_or_init(|| {
+        let text = match &message.body {
+            Body::Window(product) => members("window", &Window::new(mission, product)),
+            Body::Supersede(product, supersedes) => {
+                let window = members("supersede", &Window::new(mission, product));
+                match supersedes {
+                    Some(revision) => format!("{window},\"supersedes\":\"{revision}\""),
+                    None => window,
+                }
+            }
+            Body::Second(record) => members("raw", &RawSecond::new(mission, record)),
+            Body::Told { json, .. } => json.clone(),
+        };
+        text.into()
+    })
+}

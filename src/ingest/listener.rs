@@ -1,0 +1,191 @@
+//! The dump port: connections in, parts of playbacks out to the one writer.
+//!
+//! It never writes to a sender. How a stream is cut into reads changes nothing. Not here: what is durable (see `raw_log`) and
+//! what the frames mean (see `pipeline`).
+
+use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use tokio::io::AsyncReadExt;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::{Semaphore, mpsc};
+use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
+
+use crate::hub::status::{Board, count};
+use crate::ingest::wire::LinkConfig;
+use crate::ingest::wire::playback::{PlaybackPart, PlaybackReader};
+
+/// One read: long enough that a full-speed playback costs few wake-ups, short enough to decode in a millisecond.
+const READ_OCTETS: usize = 64 << 10;
+/// Reads waiting for the writer, of all connections: with [`READ_OCTETS`] the bound of what is taken and not yet durable.
+pub const QUEUED_READS_MAX: usize = 64;
+/// A drain is over for a sender that was silent for this long.
+const DRAIN_SILENCE: Duration = Duration::from_millis(200);
+
+/// What one read of one connection brought.
+#[derive(Debug)]
+pub struct Parts {
+    /// Number of the connection.
+    pub connection: u64,
+    /// Parts of its playbacks, in order.
+    pub parts: Vec<PlaybackPart>,
+}
+
+/// What the listener is told.
+#[derive(Debug, Clone)]
+pub struct Rules {
+    /// The link of every connection.
+    pub link: LinkConfig,
+    /// Who may send; empty: loopback only, or everybody where `open`.
+    pub allow: Vec<IpAddr>,
+    /// Everybody may send while `allow` is empty.
+    pub open: bool,
+    /// Connections at once.
+    pub connections_max: usize,
+    /// A silent connection is closed after this.
+    pub idle_timeout: Duration,
+    /// How long a drain waits for what is still being sent.
+    pub drain_timeout: Duration,
+}
+
+impl Rules {
+    fn may_send(&self, address: IpAddr) -> bool {
+        let address = address.to_canonical();
+        match self.allow.is_empty() {
+            true => self.open || address.is_loopback(),
+            false => self.allow.contains(&address),
+        }
+    }
+}
+
+/// Accepts connections until the drain, then waits for the open ones to end.
+pub async fn run(
+    listener: TcpListener,
+    rules: Rules,
+    writer: mpsc::Sender<Parts>,
+    board: Arc<Board>,
+    drain: CancellationToken,
+) {
+    // A permit per connection: the next one waits in the system's queue until one ends.
+    let permits = Arc::new(Semaphore::new(rules.connections_max));
+    let connections = TaskTracker::new();
+    let rules = Arc::new(rules);
+    let mut number = 0u64;
+    loop {
+        let permit = tokio::select! {
+            permit = permits.clone().acquire_owned() => permit.expect("the semaphore is never closed"),
+            () = drain.cancelled() => break,
+        };
+        let accepted = tokio::select! {
+            accepted = listener.accept() => accepted,
+            () = drain.cancelled() => break,
+        };
+        let (stream, peer) = match accepted {
+            Ok(accepted) => accepted,
+            Err(error) => {
+                // Out of file descriptors, most likely: waiting is all that helps.
+                tracing::warn!(%error, "a connection could not be accepted");
+                tokio::time::sleep(Duration::from_millis(100)).await;
+                continue;
+            }
+        };
+        if !rules.may_send(peer.ip()) {
+            count(&board.counters.connections_refused, 1);
+            tracing::warn!(%peer, "turned away: not among the addresses that may send (ingest.allow)");
+            continue;
+        }
+        number += 1;
+        let connection = Connection {
+            number,
+            peer,
+            rules: rules.clone(),
+            writer: writer.clone(),
+            board: board.clone(),
+            drain: drain.clone(),
+        };
+        connections.spawn(async move {
+            connection.run(stream).await;
+            drop(permit);
+        });
+    }
+    connections.close();
+    connections.wait().await;
+}
+
+struct Connection {
+    number: u64,
+    peer: SocketAddr,
+    rules: Arc<Rules>,
+    writer: mpsc::Sender<Parts>,
+    board: Arc<Board>,
+    drain: CancellationToken,
+}
+
+/// Why a connection ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    BySender,
+    Idle,
+    Drained,
+    Broken,
+}
+
+impl Connection {
+    async fn run(self, mut stream: TcpStream) {
+        let counters = &self.board.counters;
+        count(&counters.connections, 1);
+        count(&counters.connections_open, 1);
+        tracing::info!(connection = self.number, peer = %self.peer, "a sender is connected");
+        let mut reader = PlaybackReader::new(self.rules.link);
+        let mut octets = vec![0u8; READ_OCTETS];
+        let mut drain_ends = None;
+        let end = loop {
+            let patience = match drain_ends {
+                None => self.rules.idle_timeout,
+                Some(_) => DRAIN_SILENCE,
+            };
+            let read = tokio::select! {
+                read = tokio::time::timeout(patience, stream.read(&mut octets)) => read,
+                () = self.drain.cancelled(), if drain_ends.is_none() => {
+                    drain_ends = Some(tokio::time::Instant::now() + self.rules.drain_timeout);
+                    continue;
+                }
+            };
+            let taken = match read {
+                Ok(Ok(0)) => break End::BySender,
+                Ok(Ok(taken)) => taken,
+                Ok(Err(error)) => {
+                    tracing::warn!(connection = self.number, %error, "the connection broke");
+                    break End::Broken;
+                }
+                Err(_) if drain_ends.is_some() => break End::Drained,
+                Err(_) => break End::Idle,
+            };
+            count(&counters.octets_in, taken as u64);
+            let mut parts = Vec::new();
+            reader.push(&octets[..taken], |part| parts.push(part));
+            if !self.hand_on(parts).await {
+                break End::Drained;
+            }
+            if drain_ends.is_some_and(|ends| tokio::time::Instant::now() >= ends) {
+                break End::Drained;
+            }
+        };
+        let mut parts = Vec::new();
+        reader.finish(|part| parts.push(part));
+        self.hand_on(parts).await;
+        if end == End::Idle {
+            count(&counters.connections_idle, 1);
+        }
+        counters.connections_open.fetch_sub(1, Ordering::Relaxed);
+        tracing::info!(connection = self.number, ?end, bits = reader.received_bits(), "a sender is gone");
+    }
+
+    /// Waits for room in the writer's queue: a sender is held back by what is not durable yet.
+    async fn hand_on(&self, parts: Vec<PlaybackPart>) -> bool {
+        parts.is_empty() || self.writer.send(Parts { connection: self.number, parts }).await.is_ok()
+    }
+}

@@ -1,0 +1,361 @@
+//! The raw log: everything that arrived, durable, in order of arrival; the system of record.
+//!
+//! One durable transaction a batch. A batch is one value under (mission, spacecraft, batch number); beside it stand an index
+//! by channel and count, and the journal of what was told to whom (see `hub::journal`). A repeated frame is kept as a
+//! reference to the first copy, told apart by its SHA-256. Every open, decode and write fault is an error with its place.
+//! Not here: what the frames mean.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, RwLock};
+
+use redb::{Database, ReadableDatabase, TableDefinition};
+use sha2::{Digest, Sha256};
+
+use super::batch::{self, Stored};
+use crate::hub::journal;
+use crate::ingest::wire::{Arrival, FrameId, Verdict};
+
+const BATCHES: TableDefinition<&[u8], &[u8]> = TableDefinition::new("batches");
+const FRAMES: TableDefinition<&[u8], (u64, u32)> = TableDefinition::new("frames");
+const JOURNAL: TableDefinition<&[u8], &[u8]> = TableDefinition::new("journal");
+/// Under the prefix: the number of batches whose changes are in the journal.
+const JOURNALED: TableDefinition<&[u8], u64> = TableDefinition::new("journaled");
+
+/// The store reads through this much of its own cache; the operating system has more.
+const CACHE_OCTETS: usize = 24 << 20;
+
+/// What happened at the dump port, in the order of the log.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Entry {
+    /// A playback started.
+    Opened {
+        /// Its number, in order of arrival.
+        playback: u32,
+    },
+    /// A frame was found.
+    Arrival {
+        /// The playback it is of.
+        playback: u32,
+        /// The frame and what became of it.
+        arrival: Arrival,
+    },
+    /// A playback ended.
+    Closed {
+        /// Its number.
+        playback: u32,
+        /// Bits received of it.
+        bits: u64,
+    },
+}
+
+/// Why the store cannot do what it must.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The directory or the file cannot be used.
+    #[error("the store {} cannot be opened: {source}", .path.display())]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// A read or a write failed.
+    #[error("the store {} failed: {source}", .path.display())]
+    Access {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// A batch does not decode.
+    #[error("batch {number} of the store is damaged at octet {offset}: {found}")]
+    Damaged {
+        /// Its number.
+        number: u64,
+        /// Where.
+        offset: usize,
+        /// What stands there.
+        found: String,
+    },
+}
+
+/// Where the first copy of a frame is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// Number of the batch.
+    pub batch: u64,
+    /// Octet in the batch at which the frame's octets begin.
+    pub offset: u32,
+}
+
+type Digest16 = [u8; 16];
+
+/// The store of one mission and spacecraft.
+pub struct RawLog {
+    path: PathBuf,
+    /// Mission, NUL, spacecraft id: in front of every key.
+    prefix: Vec<u8>,
+    /// None while the file is being opened again after a fault.
+    database: RwLock<Option<Database>>,
+    /// Batches in the log.
+    batches: AtomicU64,
+    known: Mutex<HashMap<(FrameId, Digest16), Place>>,
+    /// Batches read last, for references.
+    recent: Mutex<Vec<(u64, std::sync::Arc<Vec<u8>>)>>,
+}
+
+impl RawLog {
+    /// Opens or makes the store in a directory.
+    ///
+    /// # Errors
+    /// When the directory or the file cannot be used, or another process holds it.
+    pub fn open(directory: &Path, mission: &str, spacecraft_id: u16) -> Result<Self, StoreError> {
+        let path = directory.join("raw.redb");
+        let failed = |source| StoreError::Open { path: path.clone(), source };
+        std::fs::create_dir_all(directory).map_err(|error| failed(error.into()))?;
+        let database = open_database(&path).map_err(failed)?;
+        let prefix = [mission.as_bytes(), &[0], &spacecraft_id.to_be_bytes()].concat();
+        Ok(Self {
+            path,
+            prefix,
+            database: RwLock::new(Some(database)),
+            batches: AtomicU64::new(0),
+            known: Mutex::default(),
+            recent: Mutex::default(),
+        })
+    }
+
+    fn failed(&self, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> StoreError {
+        StoreError::Access { path: self.path.clone(), source: source.into() }
+    }
+
+    fn key(&self, tail: &[u8]) -> Vec<u8> {
+        [&self.prefix, tail].concat()
+    }
+
+    fn with_database<T>(&self, act: impl FnOnce(&Database) -> Result<T, redb::Error>) -> Result<T, StoreError> {
+        let held = self.database.read().expect("no holder panics");
+        let database = held.as_ref().ok_or_else(|| self.failed("it is being opened again after a fault"))?;
+        act(database).map_err(|error| self.failed(error))
+    }
+
+    /// Makes a batch durable, with the journal entries that have gathered before it. Entries of several calls never mix: a batch is
+    /// either wholly there after a crash or not at all.
+    ///
+    /// # Errors
+    /// When the system refuses; nothing of the batch is there then, and the same batch can be given again.
+    pub fn append(&self, number: u64, entries: &[Entry], journal: &JournalPart<'_>) -> Result<(), StoreError> {
+        let mut known = self.known.lock().expect("no holder panics");
+        let mut fresh: Vec<((FrameId, Digest16), Place)> = Vec::new();
+        let mut octets = Vec::with_capacity(entries.len() * 1200);
+        for entry in entries {
+            let original = match entry {
+                Entry::Arrival { arrival: Arrival { verdict: Verdict::Good(id), octets, .. }, .. } => {
+                    let digest = Sha256::digest(octets)[..16].try_into().expect("a digest has 32 octets");
+                    Some(((*id, digest), known.get(&(*id, digest)).copied()))
+                }
+                _ => None,
+            };
+            let place = batch::write(&mut octets, entry, original.and_then(|(_, place)| place));
+            if let (Some((key, None)), Some(offset)) = (original, place) {
+                let place = Place { batch: number, offset };
+                known.insert(key, place);
+                fresh.push((key, place));
+            }
+        }
+        let stored = self.with_database(|database| self.commit(database, number, &octets, &fresh, journal));
+        if stored.is_ok() && !entries.is_empty() {
+            self.batches.store(number + 1, Ordering::Release);
+        }
+        if stored.is_err() {
+            for (key, _) in &fresh {
+                known.remove(key);
+            }
+        }
+        stored
+    }
+
+    fn commit(
+        &self,
+        database: &Database,
+        number: u64,
+        octets: &[u8],
+        fresh: &[((FrameId, Digest16), Place)],
+        journal: &JournalPart<'_>,
+    ) -> Result<(), redb::Error> {
+        let transaction = database.begin_write()?;
+        {
+            if !octets.is_empty() {
+                let mut batches = transaction.open_table(BATCHES)?;
+                batches.insert(self.key(&number.to_be_bytes()).as_slice(), octets)?;
+                let mut frames = transaction.open_table(FRAMES)?;
+                for ((id, digest), place) in fresh {
+                    let tail = [&[id.channel][..], &id.count.to_be_bytes(), &digest[..4]].concat();
+                    frames.insert(self.key(&tail).as_slice(), (place.batch, place.offset))?;
+                }
+            }
+            let mut table = transaction.open_table(JOURNAL)?;
+            for entry in journal.entries {
+                let key = self.key(&entry.first_seq().to_be_bytes());
+                table.insert(key.as_slice(), entry.to_octets().as_slice())?;
+            }
+            for first_seq in journal.forgotten {
+                table.remove(self.key(&first_seq.to_be_bytes()).as_slice())?;
+            }
+            transaction.open_table(JOURNALED)?.insert(self.prefix.as_slice(), journal.batches)?;
+        }
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// Closes the file and opens it again: after a refused write nothing else is allowed on it.
+    ///
+    /// # Errors
+    /// When it still cannot be opened.
+    pub fn reopen(&self) -> Result<(), StoreError> {
+        let mut held = self.database.write().expect("no holder panics");
+        *held = None;
+        *held = Some(open_database(&self.path).map_err(|source| StoreError::Open { path: self.path.clone(), source })?);
+        Ok(())
+    }
+
+    /// Reads the whole log in order, one batch at a time, and notes which frames are known.
+    ///
+    /// # Errors
+    /// When the file cannot be read or a batch is damaged; what came before has been handed on.
+    pub fn replay(&self, mut hand_on: impl FnMut(u64, Vec<Entry>)) -> Result<(), StoreError> {
+        let mut number = 0;
+        while let Some(stored) = self.stored_batch(number)? {
+            let mut entries = Vec::new();
+            for stored in stored {
+                if let Stored::Entry(
+                    Entry::Arrival { arrival: Arrival { verdict: Verdict::Good(id), octets, .. }, .. },
+                    offset,
+                ) = &stored
+                {
+                    let digest = Sha256::digest(octets)[..16].try_into().expect("a digest has 32 octets");
+                    let place = Place { batch: number, offset: *offset };
+                    self.known.lock().expect("no holder panics").insert((*id, digest), place);
+                }
+                entries.push(self.resolve(stored)?);
+            }
+            hand_on(number, entries);
+            number += 1;
+            self.batches.fetch_max(number, Ordering::Release);
+        }
+        Ok(())
+    }
+
+    /// The entries of a batch that hold a frame for the first time, or a refused one; repeats left out.
+    ///
+    /// # Errors
+    /// When the file cannot be read or the batch is damaged.
+    pub fn first_arrivals(&self, number: u64) -> Result<Vec<(u32, Arrival)>, StoreError> {
+        let stored = self.stored_batch(number)?.unwrap_or_default();
+        let arrivals = stored.into_iter().filter_map(|stored| match stored {
+            Stored::Entry(Entry::Arrival { playback, arrival }, _) => Some((playback, arrival)),
+            _ => None,
+        });
+        Ok(arrivals.collect())
+    }
+
+    /// Batches known to be durable.
+    pub fn batches(&self) -> u64 {
+        self.batches.load(Ordering::Acquire)
+    }
+
+    fn batch_octets(&self, number: u64) -> Result<Option<Vec<u8>>, StoreError> {
+        let key = self.key(&number.to_be_bytes());
+        self.with_database(|database| {
+            let transaction = database.begin_read()?;
+            match transaction.open_table(BATCHES) {
+                Ok(table) => Ok(table.get(key.as_slice())?.map(|guard| guard.value().to_vec())),
+                Err(redb::TableError::TableDoesNotExist(_)) => Ok(None),
+                Err(error) => Err(error.into()),
+            }
+        })
+    }
+
+    fn stored_batch(&self, number: u64) -> Result<Option<Vec<Stored>>, StoreError> {
+        match self.batch_octets(number)? {
+            None => Ok(None),
+            Some(octets) => {
+                batch::read(&octets).map(Some).map_err(|(offset, found)| StoreError::Damaged { number, offset, found })
+            }
+        }
+    }
+
+    /// An entry with its frame, from the first copy where it is only referred to.
+    fn resolve(&self, stored: Stored) -> Result<Entry, StoreError> {
+        let (playback, mut arrival, place) = match stored {
+            Stored::Entry(entry, _) => return Ok(entry),
+            Stored::Repeat { playback, arrival, place } => (playback, arrival, place),
+        };
+        let octets = self.recent_batch(place.batch)?;
+        let damaged = || StoreError::Damaged {
+            number: place.batch,
+            offset: place.offset as usize,
+            found: "a repeat refers to it, and no frame begins there".into(),
+        };
+        arrival.octets = batch::frame_at(&octets, place.offset).ok_or_else(damaged)?.to_vec();
+        Ok(Entry::Arrival { playback, arrival })
+    }
+
+    fn recent_batch(&self, number: u64) -> Result<std::sync::Arc<Vec<u8>>, StoreError> {
+        /// Repeats come in the order of their first copies, so few batches are needed at once.
+        const KEPT: usize = 4;
+        let mut recent = self.recent.lock().expect("no holder panics");
+        if let Some((_, octets)) = recent.iter().find(|(kept, _)| *kept == number) {
+            return Ok(octets.clone());
+        }
+        let octets = std::sync::Arc::new(self.batch_octets(number)?.unwrap_or_default());
+        if recent.len() == KEPT {
+            recent.remove(0);
+        }
+        recent.push((number, octets.clone()));
+        Ok(octets)
+    }
+
+    /// The journal in order, and the number of batches whose changes are in it.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn journal(&self) -> Result<(Vec<journal::Entry>, u64), StoreError> {
+        let from = self.prefix.clone();
+        let to = self.key(&[0xff; 9]);
+        let found = self.with_database(|database| {
+            let transaction = database.begin_read()?;
+            let table = match transaction.open_table(JOURNAL) {
+                Ok(table) => table,
+                Err(redb::TableError::TableDoesNotExist(_)) => return Ok((Vec::new(), 0)),
+                Err(error) => return Err(error.into()),
+            };
+            let mut entries = Vec::new();
+            for row in table.range(from.as_slice()..to.as_slice())? {
+                entries.push(row?.1.value().to_vec());
+            }
+            let journaled = transaction.open_table(JOURNALED)?;
+            let batches = journaled.get(self.prefix.as_slice())?.map_or(0, |guard| guard.value());
+            Ok((entries, batches))
+        })?;
+        let entries = found.0.iter().filter_map(|octets| journal::Entry::from_octets(octets)).collect();
+        Ok((entries, found.1))
+    }
+}
+
+/// What a commit adds to the journal.
+#[derive(Debug, Clone, Copy)]
+pub struct JournalPart<'a> {
+    /// New entries.
+    pub entries: &'a [journal::Entry],
+    /// First numbers of entries that fell out of the journal's bound.
+    pub forgotten: &'a [u64],
+    /// Batches whose changes are in the journal once these entries are.
+    pub batches: u64,
+}
+
+fn open_database(path: &Path) -> Result<Database, Box<dyn std::error::Error + Send + Sync>> {
+    Ok(Database::builder().set_cache_size(CACHE_OCTETS).create(path)?)
+}

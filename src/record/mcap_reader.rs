@@ -1,0 +1,57 @@
+//! Our recordings, read again: the frames as a dump, to be processed or replayed.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde::Deserialize;
+
+use super::RecordError;
+use super::mcap_file::FRAME_TOPIC;
+use crate::ingest::wire::coding::SYNC_MARKER;
+
+/// Whether octets begin as an MCAP file does.
+pub fn is_mcap(octets: &[u8]) -> bool {
+    octets.starts_with(mcap::MAGIC)
+}
+
+#[derive(Deserialize)]
+struct FrameMessage<'a> {
+    #[serde(borrow)]
+    verdict: std::borrow::Cow<'a, str>,
+    #[serde(borrow)]
+    octets: std::borrow::Cow<'a, str>,
+}
+
+/// The frames of a recording as one forward dump: each behind a sync marker, refused ones too where they are whole. A recording cut
+/// off by a crash is read as far as it goes.
+///
+/// The dump is free of channel coding; it is read with a link that has none.
+///
+/// # Errors
+/// When the octets are no MCAP, or no recording of ours.
+pub fn dump(octets: &[u8]) -> Result<Vec<u8>, RecordError> {
+    let options = enumset::EnumSet::only(mcap::read::Options::IgnoreEndMagic);
+    let messages = mcap::MessageStream::new_with_options(octets, options).map_err(RecordError::Read)?;
+    let mut dump = Vec::new();
+    let mut frames = 0u64;
+    for message in messages {
+        let message = match message {
+            Ok(message) => message,
+            // The end of a file that was cut off.
+            Err(_) if frames > 0 => break,
+            Err(error) => return Err(RecordError::Read(error)),
+        };
+        if message.channel.topic != FRAME_TOPIC {
+            continue;
+        }
+        let refuse = |found: String| RecordError::Frame { topic: FRAME_TOPIC, sequence: message.sequence, found };
+        let frame: FrameMessage<'_> =
+            serde_json::from_slice(&message.data).map_err(|error| refuse(error.to_string()))?;
+        let octets = STANDARD.decode(frame.octets.as_bytes()).map_err(|error| refuse(error.to_string()))?;
+        frames += 1;
+        if frame.verdict != "truncated" {
+            dump.extend(SYNC_MARKER.to_be_bytes());
+            dump.extend(octets);
+        }
+    }
+    if frames == 0 { Err(RecordError::NoFrames { expected: FRAME_TOPIC }) } else { Ok(dump) }
+}

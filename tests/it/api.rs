@@ -1,0 +1,143 @@
+//! The interface from outside: what is asked, what is answered, who may.
+
+use serde_json::Value;
+
+use crate::service_support::*;
+use crate::shared_data;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn before_anything_came_there_is_no_value_and_that_is_a_problem_document() {
+    let running = start().await;
+    let (status, problem) = running.problem("/accel").await;
+    assert_eq!((status, problem["status"].as_u64()), (404, Some(404)));
+    assert!(problem["detail"].as_str().unwrap().contains("no calibrated window"));
+    let history = running.get("/accel/history").await;
+    assert_eq!(history["windows"], 0);
+    let status = running.get("/status").await;
+    assert_eq!(status["ingest"]["frames_durable"], 0);
+    assert_eq!(status["accel"]["windows"], 0);
+    assert!(status["uptime_s"].as_f64().unwrap() > 0.0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_named_route_answers_and_is_described() {
+    let running = start().await;
+    running.send(&dump(20_000, 300, 0)).await;
+    running.wait_for_playbacks(1).await;
+    let openapi = running.get("/openapi.json").await;
+    let named = [
+        "/accel",
+        "/accel/history",
+        "/accel/live",
+        "/calibration",
+        "/calibration/history",
+        "/gaps",
+        "/playbacks",
+        "/events",
+        "/anomalies",
+        "/diagnosis",
+        "/status",
+        "/healthz",
+        "/readyz",
+        "/metrics",
+    ];
+    for path in named {
+        assert!(openapi["paths"][path]["get"].is_object(), "{path} is not described");
+    }
+    for path in ["/gaps", "/playbacks", "/events", "/anomalies", "/calibration/history", "/status", "/accel/history"] {
+        running.get(path).await;
+    }
+    for path in ["/healthz", "/readyz", "/"] {
+        assert_eq!(reqwest::get(running.url(path)).await.unwrap().status(), 200, "{path}");
+    }
+    let metrics = reqwest::get(running.url("/metrics")).await.unwrap().text().await.unwrap();
+    let durable = metrics.lines().find(|line| line.starts_with("oare_frames_durable_total ")).unwrap();
+    let frames: u64 = durable.rsplit(' ').next().unwrap().parse().unwrap();
+    assert_eq!(running.get("/status").await["ingest"]["frames_durable"], frames);
+    let (status, _) = running.problem("/nowhere").await;
+    assert_eq!(status, 404);
+    let posted = reqwest::Client::new().post(running.url("/accel")).send().await.unwrap();
+    assert_eq!(problem_of(posted).await.0, 405);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_dashboard_needs_nothing_from_outside() {
+    let running = start().await;
+    let page = reqwest::get(running.url("/")).await.unwrap().text().await.unwrap();
+    assert!(!page.contains("http://") && !page.contains("https://"), "the page names another origin");
+    for part in page.split('"').filter(|part| part.starts_with("dashboard/")) {
+        let answer = reqwest::get(running.url(&format!("/{part}"))).await.unwrap();
+        assert_eq!(answer.status(), 200, "{part}");
+        assert!(answer.headers()["content-security-policy"].to_str().unwrap().starts_with("default-src 'none'"));
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_configured_token_is_needed_everywhere_but_for_health() {
+    const TOKEN: &str = "a-token-of-some-length";
+    let running = start_with(|config| config.http.token = Some(TOKEN.into())).await;
+    for path in ["/accel", "/status", "/", "/metrics", "/accel/live"] {
+        let answer = reqwest::get(running.url(path)).await.unwrap();
+        assert_eq!(answer.status(), 401, "{path}");
+        assert!(answer.headers().contains_key("www-authenticate"));
+    }
+    assert_eq!(reqwest::get(running.url("/healthz")).await.unwrap().status(), 200);
+    let client = reqwest::Client::new();
+    let with_header = |token: &str| client.get(running.url("/status")).bearer_auth(token).send();
+    assert_eq!(with_header(TOKEN).await.unwrap().status(), 200);
+    assert_eq!(with_header("another-token-of-length").await.unwrap().status(), 401);
+    assert_eq!(reqwest::get(running.url(&format!("/status?access_token={TOKEN}"))).await.unwrap().status(), 200);
+    let mut live = running.live(&format!("access_token={TOKEN}")).await;
+    assert_eq!(live.next().await.unwrap()["type"], "hello");
+    let refused = tokio_tungstenite::connect_async(format!("ws://{}/accel/live", running.service.http_address)).await;
+    assert!(refused.is_err(), "a WebSocket without the token");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn parameters_that_make_no_sense_are_named() {
+    let running = start().await;
+    let cases = [
+        ("/accel/history?from=soon", "soon"),
+        ("/accel/history?from=10&to=5", "after"),
+        ("/accel/history?max_points=0", "max_points"),
+        ("/calibration?as_of=1994-13-01", "as_of"),
+        ("/accel/live?topics=weather", "weather"),
+        ("/accel/live?from=seq:x", "seq:x"),
+        ("/accel/live?from=seq:99999", "99999"),
+    ];
+    for (path, named) in cases {
+        let (status, problem) = running.problem(path).await;
+        assert_eq!(status, 400, "{path}");
+        assert!(problem["detail"].as_str().unwrap().contains(named), "{path}: {problem}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_sample_comes_out_as_accelerations_with_errors_and_history_in_buckets() {
+    let Some(folder) = shared_data("dumps") else { return };
+    let running = start().await;
+    running.send(&std::fs::read(folder.join("clean-6h.dump")).unwrap()).await;
+    let status = running.wait_for_playbacks(1).await;
+    assert_eq!(status["ingest"]["seconds_covered"], 21_600);
+    let accel = running.get("/accel").await;
+    assert_eq!(accel["frame"], "orbiter_body");
+    for axis in ["x", "y", "z"] {
+        assert!(accel[format!("a{axis}_ng")].is_f64(), "{accel}");
+        assert!(accel[format!("sigma_a{axis}_ng")].as_f64().unwrap() > 0.0, "{accel}");
+    }
+    let all = running.get("/accel/history?max_points=100000").await;
+    let windows = all["windows"].as_u64().unwrap();
+    assert_eq!(windows, status["accel"]["windows"].as_u64().unwrap());
+    let coarse = running.get("/accel/history?max_points=50").await;
+    let buckets = coarse["buckets"].as_array().unwrap();
+    assert!(buckets.len() <= 50);
+    assert_eq!(buckets.iter().map(|bucket| bucket["count"].as_u64().unwrap()).sum::<u64>(), windows);
+    let extreme = |history: &Value, which: &str| {
+        let values = history["buckets"].as_array().unwrap().iter().filter_map(|bucket| bucket["az_ng"][which].as_f64());
+        values.collect::<Vec<_>>()
+    };
+    let least = |values: Vec<f64>| values.into_iter().fold(f64::INFINITY, f64::min);
+    assert_eq!(least(extreme(&all, "min")), least(extreme(&coarse, "min")), "buckets keep the extremes");
+    let latest = all["buckets"].as_array().unwrap().iter().rev().find(|bucket| !bucket["ax_ng"].is_null()).unwrap();
+    assert_eq!(latest["ax_ng"]["mean"], accel["ax_ng"]);
+}

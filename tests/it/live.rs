@@ -1,0 +1,152 @@
+//! The WebSocket: numbers without holes, resumption, the seam from history to live, slow readers.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use crate::service_support::*;
+
+/// Every message names the one before it.
+fn assert_chain(messages: &[Value]) {
+    for pair in messages.windows(2) {
+        assert_eq!(pair[1]["prev"], pair[0]["seq"], "{} after {}", pair[1], pair[0]);
+        assert!(pair[1]["seq"].as_u64() > pair[0]["seq"].as_u64() || pair[0]["type"] == "hello");
+    }
+}
+
+fn starts(messages: &[Value], kind: &str) -> Vec<i64> {
+    let of_kind = messages.iter().filter(|message| message["type"] == kind);
+    of_kind.map(|message| message["window_start_clock_s"].as_f64().unwrap() as i64).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn messages_are_numbered_without_holes_and_a_reader_resumes_where_it_was() {
+    let running = start().await;
+    let mut live = running.live("topics=window,event").await;
+    let hello = live.next().await.unwrap();
+    assert_eq!((hello["type"].as_str(), hello["seq"].as_u64()), (Some("hello"), Some(0)));
+    running.send(&dump(20_000, 1200, 0)).await;
+    let head = running.wait_for_playbacks(1).await["live"]["head_seq"].as_u64().unwrap();
+    let last = running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window,event").unwrap(), head);
+    let mut messages = vec![hello];
+    messages.extend(live.through(last).await);
+    assert_chain(&messages);
+    let whole = starts(&messages, "window");
+    assert_eq!(whole.len(), running.get("/status").await["accel"]["windows"].as_u64().unwrap() as usize);
+
+    let from = messages[messages.len() / 2]["seq"].as_u64().unwrap();
+    let mut resumed = running.live(&format!("topics=window,event&from=seq:{from}")).await;
+    assert_eq!(resumed.next().await.unwrap()["seq"], from);
+    let rest = resumed.through(last).await;
+    let expected: Vec<&Value> = messages.iter().filter(|message| message["seq"].as_u64() > Some(from)).collect();
+    assert_eq!(rest.iter().collect::<Vec<_>>(), expected);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn numbers_last_over_restarts_and_old_messages_can_be_had_again() {
+    let running = start().await;
+    running.send(&dump(20_000, 1200, 0)).await;
+    let head = running.wait_for_playbacks(1).await["live"]["head_seq"].as_u64().unwrap();
+    let mut live = running.live("topics=window,raw&from=seq:0").await;
+    let before = live.through(head).await;
+    let products = running.products();
+
+    let running = running.restart().await;
+    let status = running.get("/status").await;
+    assert_eq!(status["live"]["head_seq"], head, "a restart tells nothing new");
+    assert_eq!(running.products(), products);
+    let mut live = running.live("topics=window,raw&from=seq:0").await;
+    let again = live.through(head).await;
+    assert_eq!(before.len(), again.len());
+    assert_chain(&again);
+    for (before, again) in before.iter().zip(&again).skip(1) {
+        assert_eq!((&before["seq"], &before["type"]), (&again["seq"], &again["type"]));
+        assert_eq!(before["revision"], again["revision"]);
+    }
+    running.send(&dump(21_200, 600, 2000)).await;
+    let next = running.wait_for_playbacks(2).await["live"]["head_seq"].as_u64().unwrap();
+    assert!(next > head);
+    let more = live
+        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window,raw").unwrap(), next))
+        .await;
+    assert_eq!(more[0]["prev"].as_u64(), again.last().unwrap()["seq"].as_u64(), "the chain goes on after the restart");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn history_goes_over_into_live_without_a_hole_or_a_repeat() {
+    let running = start().await;
+    running.send(&dump(20_000, 3000, 0)).await;
+    running.wait_for_playbacks(1).await;
+    let mut live = running.live("from=20000&topics=window").await;
+    assert_eq!(live.next().await.unwrap()["type"], "hello");
+    // More arrives while the history is on its way.
+    running.send(&dump(23_000, 3000, 5000)).await;
+    let head = running.wait_for_playbacks(2).await["live"]["head_seq"].as_u64().unwrap();
+    let messages = live
+        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), head))
+        .await;
+    assert_chain(&messages);
+    let windows = starts(&messages, "window");
+    let distinct: BTreeSet<i64> = windows.iter().copied().collect();
+    assert_eq!(windows.len(), distinct.len(), "a window came twice");
+    let expected: Vec<i64> = (20_000 / 25..6000 / 25 + 20_000 / 25).map(|cell| cell * 25).collect();
+    assert_eq!(distinct.into_iter().collect::<Vec<_>>(), expected);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_late_frame_supersedes_the_windows_it_touches_and_no_other() {
+    let running = start().await;
+    let whole = dump(20_000, 1000, 0);
+    const CADU_OCTETS: usize = 1119;
+    let (before, late, after) =
+        (&whole[..40 * CADU_OCTETS], &whole[40 * CADU_OCTETS..41 * CADU_OCTETS], &whole[41 * CADU_OCTETS..]);
+    running.send(&[before, after].concat()).await;
+    let head = running.wait_for_playbacks(1).await["live"]["head_seq"].as_u64().unwrap();
+    assert_eq!(running.get("/gaps").await["gaps"].as_array().unwrap().len(), 1);
+    let mut live = running.live("topics=window").await;
+    live.next().await.unwrap();
+    running.send(late).await;
+    let last = running.wait_for_playbacks(2).await["live"]["head_seq"].as_u64().unwrap();
+    let messages = live
+        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), last))
+        .await;
+    assert!(last > head);
+    let touched = starts(&messages, "supersede");
+    assert!((1..=3).contains(&touched.len()), "{touched:?}");
+    for message in messages.iter().filter(|message| message["type"] == "supersede") {
+        assert_ne!(message["supersedes"], message["revision"]);
+    }
+    assert!(running.get("/gaps").await["gaps"].as_array().unwrap().is_empty());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_slow_reader_is_told_what_it_missed() {
+    let running = start_with(|config| {
+        config.http.live_queue_messages = 16;
+        config.http.live_behind_messages = 40;
+    })
+    .await;
+    let mut live = running.live("topics=window&from=seq:0").await;
+    assert_eq!(live.next().await.unwrap()["type"], "hello");
+    running.send(&dump(20_000, 5000, 0)).await;
+    let status = running.wait_for_playbacks(1).await;
+    // It comes back for messages that are further behind than the bound.
+    let mut late = running.live("topics=window&from=seq:1").await;
+    assert_eq!(late.next().await.unwrap()["type"], "hello");
+    let lag = late.next().await.unwrap();
+    assert_eq!(lag["type"], "lag", "{lag}");
+    let head = status["live"]["head_seq"].as_u64().unwrap();
+    let messages = late
+        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), head))
+        .await;
+    assert_eq!(messages[0]["prev"], lag["seq"]);
+    assert_chain(&messages);
+    let all = status["accel"]["windows"].as_u64().unwrap()
+        + running.get("/gaps").await["gaps"].as_array().unwrap().len() as u64;
+    let first_excluded = u64::from(starts(&messages, "window").len() as u64 + lag["count"].as_u64().unwrap() < all);
+    assert_eq!(
+        messages.len() as u64 + lag["count"].as_u64().unwrap() + first_excluded,
+        all,
+        "told and missed are all there is"
+    );
+}

@@ -1,0 +1,271 @@
+//! Nothing lost: kills, drains, restarts, and recordings that say the same.
+
+use std::io::Write;
+use std::net::{SocketAddr, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use oare_ground::config::Config;
+use oare_ground::ingest::raw_log::RawLog;
+use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader};
+use oare_ground::ingest::writer::rebuild;
+use oare_ground::pipeline::{PlaybackId, Settings, station::replay};
+use oare_ground::record::mcap_reader;
+use oare_ground::service::Service;
+
+use crate::service_support::*;
+use crate::shared_data;
+
+/// The products of dumps taken by the pure core, without sockets or store.
+fn undisturbed(dumps: &[Vec<u8>]) -> [String; 3] {
+    let station = replay(&Settings::sts65(), None, |station| {
+        for (n, dump) in (0..).zip(dumps) {
+            let mut playback = n * 1000;
+            let mut reader = PlaybackReader::new(LinkConfig::default());
+            let mut take = |part: PlaybackPart| match part {
+                PlaybackPart::Opened => {
+                    playback += 1;
+                    station.open_playback(PlaybackId(playback));
+                }
+                PlaybackPart::Arrival(arrival) => station.take(PlaybackId(playback), &arrival),
+                PlaybackPart::Closed { bits } => station.close_playback(PlaybackId(playback), bits),
+            };
+            reader.push(dump, &mut take);
+            reader.finish(&mut take);
+        }
+    });
+    products(&station)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_service_and_the_pure_core_say_the_same_and_a_restart_changes_nothing() {
+    let Some(folder) = shared_data("dumps/messy-6h") else { return };
+    let dumps: Vec<Vec<u8>> = (1..=6).map(|n| std::fs::read(folder.join(format!("{n}.dump"))).unwrap()).collect();
+    let running = start().await;
+    for dump in &dumps {
+        running.send(dump).await;
+        let octets = running.service.board.counters.octets_in.load(std::sync::atomic::Ordering::Relaxed);
+        assert!(octets > 0 || dump.is_empty());
+    }
+    let status = running.wait_for("every playback over", |status| {
+        status["ingest"]["connections_open"] == 0
+            && status["ingest"]["seconds_covered"] == 21_296
+            && status["ingest"]["playbacks_open"] == 0
+    });
+    status.await;
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    let expected = undisturbed(&dumps);
+    assert_eq!(running.products(), expected);
+    let running = running.restart().await;
+    assert_eq!(running.products(), expected);
+    assert_eq!(running.get("/status").await["ingest"]["seconds_covered"], 21_296);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_drain_takes_what_was_sent_and_tells_the_readers() {
+    let running = start().await;
+    let octets = dump(20_000, 2000, 0);
+    let mut live = running.live("topics=window").await;
+    live.next().await.unwrap();
+    let mut sender = TcpStream::connect(running.service.ingest_address).unwrap();
+    sender.write_all(&octets).unwrap();
+    // The sender stays connected: the drain does not wait for it for ever.
+    running.wait_for("something taken", |status| status["ingest"]["frames_durable"].as_u64() > Some(0)).await;
+    let Running { service, dir } = running;
+    service.drain().await.unwrap();
+    drop(sender);
+    while live.next().await.is_some() {}
+    let settings = Settings::sts65();
+    let log = RawLog::open(dir.path(), &settings.mission, settings.link.spacecraft_id).unwrap();
+    let station = rebuild(&log, &settings).unwrap();
+    assert_eq!(station.ledger().seconds.len(), 2000);
+    assert_eq!(station.ledger().playbacks().filter(|(_, playback)| !playback.closed).count(), 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_recording_holds_every_frame_and_reads_back_to_the_same_products() {
+    let running = start().await;
+    running.send(&dump(20_000, 2000, 0)).await;
+    running.send(&dump(21_500, 1500, 300)).await;
+    running.wait_for_playbacks(2).await;
+    let products = running.products();
+    let Running { service, dir } = running;
+    service.drain().await.unwrap();
+    let recordings = std::fs::read_dir(dir.path().join("recordings")).unwrap();
+    let paths: Vec<_> = recordings.map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(paths.len(), 1, "{paths:?}");
+    let octets = std::fs::read(&paths[0]).unwrap();
+    let summary = mcap::Summary::read(&octets).unwrap().expect("an index");
+    assert!(
+        summary
+            .channels
+            .values()
+            .all(|channel| channel.schema.as_ref().is_some_and(|schema| schema.encoding == "jsonschema"))
+    );
+    assert_eq!(undisturbed(&[mcap_reader::dump(&octets).unwrap()]), products);
+    read_with_python(&paths[0], &octets);
+    // What follows goes into a file of its own.
+    let running = Running { service: Service::start(config(&dir)).await.unwrap(), dir };
+    running.send(&dump(23_000, 500, 700)).await;
+    running.wait_for_playbacks(3).await;
+    let Running { service, dir } = running;
+    service.drain().await.unwrap();
+    assert_eq!(std::fs::read_dir(dir.path().join("recordings")).unwrap().count(), 2);
+}
+
+/// The package of the format's own makers reads what is written here.
+fn read_with_python(path: &std::path::Path, octets: &[u8]) {
+    const SCRIPT: &str = "
+import sys, json
+from mcap.reader import make_reader
+counts = {}
+with open(sys.argv[1], 'rb') as f:
+    reader = make_reader(f, validate_crcs=True)
+    for schema, channel, message in reader.iter_messages():
+        value = json.loads(message.data)
+        required = json.loads(schema.data)['properties']
+        assert set(value) <= set(required) | {'supersedes', 'to_utc', 'from_utc', 'from_clock_s', 'to_clock_s'}, (channel.topic, set(value) - set(required))
+        counts[channel.topic] = counts.get(channel.topic, 0) + 1
+print(json.dumps(counts))
+";
+    let output = match Command::new("python3").args(["-c", SCRIPT]).arg(path).output() {
+        Ok(output) => output,
+        Err(_) => return eprintln!("SKIPPED: no python3 to read the recording with"),
+    };
+    let told = String::from_utf8_lossy(&output.stderr);
+    if told.contains("No module named 'mcap'") {
+        return eprintln!("SKIPPED: the Python package mcap is not installed");
+    }
+    assert!(output.status.success(), "{told}");
+    let counts: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let frames =
+        mcap::MessageStream::new(octets).unwrap().filter(|m| m.as_ref().unwrap().channel.topic == "/raw/frame").count();
+    assert_eq!(counts["/raw/frame"], frames);
+    assert!(counts["/accel/window"].as_u64() > Some(0));
+}
+
+/// The real program, in a process of its own.
+struct Program {
+    child: Child,
+    ingest: SocketAddr,
+    http: SocketAddr,
+}
+
+/// A port that is free now.
+fn free_port() -> SocketAddr {
+    std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap()
+}
+
+impl Program {
+    fn start(data: &std::path::Path) -> Self {
+        let (ingest, http) = (free_port(), free_port());
+        let child = Command::new(env!("CARGO_BIN_EXE_oare"))
+            .arg("serve")
+            .args(["--ingest", &ingest.to_string(), "--http", &http.to_string(), "--data"])
+            .arg(data)
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        Self { child, ingest, http }
+    }
+
+    async fn status(&self) -> Option<serde_json::Value> {
+        reqwest::get(format!("http://{}/status", self.http)).await.ok()?.json().await.ok()
+    }
+
+    async fn wait_until(&self, holds: impl Fn(&serde_json::Value) -> bool) -> serde_json::Value {
+        let start = Instant::now();
+        loop {
+            if let Some(status) = self.status().await
+                && holds(&status)
+            {
+                return status;
+            }
+            assert!(start.elapsed() < PATIENCE, "the program does not get there");
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    }
+
+    /// As `kill -9`.
+    fn kill(mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+}
+
+/// Kills the service at so many instants of a playback at full speed; whatever it had counted must be there, and in the end the products
+/// are those of an undisturbed run.
+async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, seed: u64) {
+    let dir = tempfile::tempdir().unwrap();
+    let mut state = seed;
+    let mut random = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / f64::from(1 << 24)
+    };
+    let expected = undisturbed(dumps);
+    for n in 0..kills {
+        let program = Program::start(dir.path());
+        program.wait_until(|status| status["phase"] == "running").await;
+        let (ingest, dump) = (program.ingest, dumps[n as usize % dumps.len()].clone());
+        let sender = std::thread::spawn(move || {
+            if let Ok(mut stream) = TcpStream::connect(ingest) {
+                let _ = stream.write_all(&dump);
+            }
+        });
+        // Some kills fall into the middle of a commit: the instants are spread over the time that a playback takes.
+        let until = Instant::now() + Duration::from_secs_f64(random() * 0.6);
+        let mut counted = 0;
+        while Instant::now() < until {
+            if let Some(status) = program.status().await {
+                counted = status["ingest"]["frames_durable"].as_u64().unwrap();
+            }
+        }
+        program.kill();
+        sender.join().unwrap();
+        let settings = Settings::sts65();
+        let log = RawLog::open(dir.path(), &settings.mission, settings.link.spacecraft_id).unwrap();
+        let station = rebuild(&log, &settings).unwrap();
+        let durable = station.ledger().total().frames_found;
+        assert!(durable >= counted, "kill {n}: {counted} frames were counted, {durable} are there");
+    }
+    let program = Program::start(dir.path());
+    program.wait_until(|status| status["phase"] == "running").await;
+    for dump in dumps {
+        send(program.ingest, dump).await;
+    }
+    program
+        .wait_until(|status| status["ingest"]["playbacks_open"] == 0 && status["ingest"]["connections_open"] == 0)
+        .await;
+    program.kill();
+    let settings = Config::standard().settings;
+    let log = RawLog::open(dir.path(), &settings.mission, settings.link.spacecraft_id).unwrap();
+    assert_eq!(products(&rebuild(&log, &settings).unwrap()), expected);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_killed_service_has_everything_it_counted() {
+    let dumps: Vec<Vec<u8>> = (0..2).map(|n| dump(20_000 + n * 9_000, 9_000, n as u32 * 10_000)).collect();
+    kill_and_restart(&dumps, 4, 7).await;
+}
+
+#[cfg(feature = "slow")]
+#[tokio::test(flavor = "multi_thread")]
+async fn fifty_kills_in_a_mission_lose_nothing() {
+    use oare_ground::simulate::recorder::{Framer, Packetiser, RecorderConfig, playbacks};
+    use oare_ground::simulate::{Mission, MissionConfig};
+    /// The 14.75 days of STS-65.
+    const HOURS: f64 = 354.0;
+    let mission = Mission::new(MissionConfig::sts65(65, HOURS)).unwrap();
+    let link = LinkConfig::default();
+    let (mut packetiser, mut framer) = (Packetiser::default(), Framer::new(link, 1, 0));
+    let mut frames = Vec::new();
+    for second in mission.fly() {
+        for sent in &second.sent {
+            framer.push(&packetiser.packet(sent), |frame| frames.push(frame));
+        }
+    }
+    framer.finish(|frame| frames.push(frame));
+    let passes = playbacks(&frames, &link, &RecorderConfig::messy(), 65);
+    let octets: Vec<u8> = passes.into_iter().flat_map(|pass| pass.octets).collect();
+    kill_and_restart(&[octets], 50, 65).await;
+}
