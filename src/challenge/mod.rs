@@ -1,6 +1,7 @@
 //! Concealed cases: made, sealed, analysed blind, revealed, scored.
 
 pub mod conceal;
+pub mod engine;
 pub mod real;
 pub mod run;
 pub mod score;
