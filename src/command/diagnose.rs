@@ -9,6 +9,7 @@ use oare_ground::diagnose::analysis::{Analysis, Prepared, Settings};
 use oare_ground::diagnose::answer::{Diagnosis, Verdict};
 use oare_ground::diagnose::case::{Case, Header, Texts};
 use oare_ground::diagnose::error::CaseError;
+use oare_ground::diagnose::measured::{self, MeasuredCase};
 use oare_ground::diagnose::report;
 use rayon::prelude::*;
 
@@ -43,8 +44,46 @@ pub struct Args {
     claim_probability: f64,
 }
 
+/// Orbits, series and poses: recordings of another kind, the same answer in their own unit.
+fn measured(args: &Args) -> anyhow::Result<ExitCode> {
+    let read = oare_ground::challenge::real::read(&args.case, &args.set).map_err(anyhow::Error::from);
+    let answer = match read.and_then(|(case, files)| Ok(measured::diagnose(&case, &files)?)) {
+        Ok(answer) => answer,
+        Err(error) => {
+            eprintln!("oare: {error:#}");
+            return Ok(super::unusable());
+        }
+    };
+    let json = serde_json::to_string_pretty(&answer).context("the answer does not serialise")?;
+    if let Some(out) = &args.out {
+        write(out, &json)?;
+    }
+    if let Some(directory) = &args.report {
+        write(&directory.join("diagnosis.json"), &json)?;
+    }
+    if args.json {
+        println!("{json}");
+        return Ok(super::DONE);
+    }
+    println!("{}: {:?}", answer.case, answer.verdict);
+    for effect in &answer.effects {
+        println!("  {}: {}", effect.id, effect.why);
+        for p in &effect.parameters {
+            println!("    {} = {:.4e} +- {:.1e} {}", p.name, p.value, p.sigma, p.unit);
+        }
+    }
+    for note in &answer.notes {
+        println!("  {note}");
+    }
+    Ok(super::DONE)
+}
+
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let text = std::fs::read_to_string(args.case.join("case.toml")).unwrap_or_default();
+    if MeasuredCase::kind_of(&text).is_some() {
+        return measured(&args);
+    }
     let analysis = match analyse(&args) {
         Ok(analysis) => analysis,
         Err(error) => {
