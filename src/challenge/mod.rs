@@ -1,6 +1,8 @@
 //! Concealed cases: made, sealed, analysed blind, revealed, scored.
 
 pub mod conceal;
+pub mod engine;
+pub mod real;
 pub mod run;
 pub mod score;
 pub mod seal;

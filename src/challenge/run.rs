@@ -4,6 +4,7 @@
 //! and must hash to its seal. Not here: the analyser (an argument) and the figures (see `score`).
 
 use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
@@ -136,7 +137,9 @@ pub fn write(orders: &[Order], seals: &[Seal], directory: &Path, progress: &Prog
 
 fn timed(analyser: &dyn Analyser, material: &Material, deleted: Option<&str>) -> (Result<Answer, String>, f64) {
     let begin = Instant::now();
-    let answer = analyser.answer(material, deleted);
+    // A panic is a defect of the analyser and costs it the case, not the run.
+    let answer = catch_unwind(AssertUnwindSafe(|| analyser.answer(material, deleted)))
+        .unwrap_or_else(|_| Err("the analyser panicked".into()));
     let seconds = begin.elapsed().as_secs_f64();
     let answer = answer.and_then(|value| {
         serde_json::from_value(value).map_err(|error| format!("the answer is not of the schema: {error}"))

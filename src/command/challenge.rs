@@ -1,11 +1,13 @@
 //! `oare challenge`: conceal cases, commit to their truth, analyse them blind, reveal, score.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use oare_ground::challenge::conceal::{Kind, effect, law};
+use oare_ground::challenge::engine::Engine;
+use oare_ground::challenge::score::{Outcome, score};
 use oare_ground::challenge::{run, seal};
 
 /// Conceal cases, commit to their truth, analyse them blind, reveal, score.
@@ -26,13 +28,59 @@ pub struct Args {
     /// Winds, density waves and panel areas that the analyser's regressors do not have.
     #[arg(long)]
     other_physics: bool,
-    /// Write the cases here as directories, their truths apart from them.
+    /// Draw from the real recordings below this folder instead of simulated ones.
+    #[arg(long)]
+    real: Option<PathBuf>,
+    /// Bootstrap replicates per case; without them the table of nulls decides.
+    #[arg(long, default_value_t = 0)]
+    bootstrap: usize,
+    /// Score the case directories in this one that carry their truth.json, instead of concealed cases.
+    #[arg(long)]
+    open: Option<PathBuf>,
+    /// Write the cases here as directories, their truths apart from them, and the outcomes.
     #[arg(long)]
     out: Option<PathBuf>,
+    /// Make and seal the cases, and analyse none.
+    #[arg(long, requires = "out")]
+    make: bool,
+    /// The score as JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if let Some(dir) = &args.real {
+        return super::challenge_real::run(dir, args.cases, args.seed, args.out.as_deref());
+    }
+    let engine = Engine { bootstraps: args.bootstrap, seed: args.seed };
+    let outcomes = match &args.open {
+        Some(directory) => {
+            let progress = bar(0, "analysing");
+            let outcomes = run::run_open(directory, &engine, &progress)
+                .with_context(|| format!("cannot read the cases of {}", directory.display()))?;
+            progress.finish_and_clear();
+            outcomes
+        }
+        None => match concealed(&args, &engine)? {
+            Some(outcomes) => outcomes,
+            None => return Ok(super::DONE),
+        },
+    };
+    if let Some(out) = &args.out {
+        keep(out, &outcomes).with_context(|| format!("cannot write to {}", out.display()))?;
+    }
+    let score = score(&outcomes);
+    if args.json {
+        println!("{}", serde_json::to_string_pretty(&score)?);
+    } else {
+        print!("{score}");
+    }
+    Ok(super::DONE)
+}
+
+/// Seals, perhaps writes, analyses; nothing to score when the cases were only to be made.
+fn concealed(args: &Args, engine: &Engine) -> anyhow::Result<Option<Vec<Outcome>>> {
     let only = args.effect.as_deref().map(known).transpose()?;
     let kinds = match (args.kinds.is_empty(), only) {
         (false, _) => args.kinds.clone(),
@@ -50,18 +98,30 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         run::write(&orders, &seals, out, &progress).with_context(|| format!("cannot write to {}", out.display()))?;
         progress.finish_and_clear();
     }
-    Ok(super::DONE)
+    if args.make {
+        return Ok(None);
+    }
+    let progress = bar(orders.len(), "analysing");
+    let outcomes = run::run(&orders, &seals, engine, &progress)?;
+    progress.finish_and_clear();
+    Ok(Some(outcomes))
+}
+
+/// One line of JSON per case: truth, answer, time.
+fn keep(out: &Path, outcomes: &[Outcome]) -> anyhow::Result<()> {
+    std::fs::create_dir_all(out)?;
+    let lines: Result<Vec<String>, _> = outcomes.iter().map(serde_json::to_string).collect();
+    std::fs::write(out.join("outcomes.jsonl"), lines?.join("\n") + "\n")?;
+    Ok(())
 }
 
 fn known(id: &str) -> anyhow::Result<&'static str> {
-    let mut ids = effect::IDS.into_iter().chain(law::LAWS.map(|(name, _)| name));
-    ids.find(|known| *known == id).with_context(|| {
-        let all: Vec<&str> = effect::IDS.into_iter().chain(law::LAWS.map(|(name, _)| name)).collect();
-        format!("no effect or law `{id}`; there are: {}", all.join(", "))
-    })
+    let all = || effect::IDS.into_iter().chain(law::LAWS.map(|(name, _)| name));
+    let there = || all().collect::<Vec<&str>>().join(", ");
+    all().find(|known| *known == id).with_context(|| format!("no effect or law `{id}`; there are: {}", there()))
 }
 
-fn bar(length: usize, doing: &'static str) -> ProgressBar {
+pub(super) fn bar(length: usize, doing: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg:>10} {bar:40} {pos}/{len} {elapsed} (left {eta})");
     let bar = ProgressBar::new(length as u64).with_message(doing);
     if let Ok(style) = style { bar.with_style(style) } else { bar }

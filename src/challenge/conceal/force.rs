@@ -130,7 +130,8 @@ pub fn field_t(flight: &Flight) -> Series {
         .collect()
 }
 
-/// 1 while an event of the kind lasts, the covered part of the step at its edges.
+/// 1 while an event of the kind lasts, the covered part of the step at its edges. Firings that overlap add up; of anything
+/// else, overlapping lines of the log are the same event.
 pub fn during(flight: &Flight, kind: &str) -> Vec<f64> {
     let mut on = vec![0.0; flight.times_s.len()];
     let half = super::flight::STEP_S / 2.0;
@@ -138,7 +139,7 @@ pub fn during(flight: &Flight, kind: &str) -> Vec<f64> {
         let (from, to) = (event.clock_s, event.clock_s + event.duration_s);
         for (on, t) in on.iter_mut().zip(&flight.times_s) {
             let covered = (to.min(t + half) - from.max(t - half)).max(0.0) / (2.0 * half);
-            *on = f64::max(*on, covered);
+            *on = if kind == "thruster" { *on + covered } else { f64::max(*on, covered) };
         }
     }
     on

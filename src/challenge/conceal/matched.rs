@@ -66,12 +66,15 @@ impl<'a> Matched<'a> {
         effect::IDS
             .iter()
             .filter(|id| effect::event_needed(id).is_none_or(|kind| kinds.contains(&kind)))
-            .map(|id| {
-                let groups = self.groups(id, signal, total);
-                let left = groups.iter().map(|g| self.left_of(white, g)).fold(f64::INFINITY, f64::min);
-                (*id, left)
-            })
+            .map(|id| (*id, self.left_by(id, white, signal, total)))
             .collect()
+    }
+
+    /// What is left of `white` when one effect imitates it best; all of it by what is no effect of the catalogue.
+    pub fn left_by(&self, id: &str, white: &White, signal: &Signal, total: &[Vector3<f64>]) -> f64 {
+        let Some(id) = effect::IDS.into_iter().find(|known| *known == id) else { return Self::snr(white) };
+        let groups = self.groups(id, signal, total);
+        groups.iter().map(|g| self.left_of(white, g)).fold(Self::snr(white), f64::min)
     }
 
     fn left_of(&self, white: &White, group: &Group) -> f64 {

@@ -174,15 +174,20 @@ impl Question {
             felt = force::plus(&felt, series);
         }
         snr.extend(whites.iter().map(Matched::snr));
-        // Of a pair, what its own effects leave of each other; of one, what any effect leaves of it.
-        let lefts: Vec<Vec<(&'static str, f64)>> = whites.iter().map(|w| matched.left(w, &signal, &felt)).collect();
-        let left = if let [only] = lefts.as_slice() { only.clone() } else { Vec::new() };
-        let apart = (0..lefts.len() * usize::from(lefts.len() == 2))
-            .map(|i| {
-                let other = &parts[1 - i].0;
-                lefts[i].iter().find(|(id, _)| id == other).map_or(0.0, |(_, left)| left / snr[i])
-            })
-            .fold(1.0, f64::min);
+        // What any effect leaves of one, and what the effects of a pair leave of each other; of a question that will not be
+        // asked anyway, nothing is worked out.
+        let asked = snr.iter().all(|snr| *snr >= SNR_MIN);
+        let left = match whites.as_slice() {
+            [only] if asked => matched.left(only, &signal, &felt),
+            _ => Vec::new(),
+        };
+        let apart = match whites.as_slice() {
+            [a, b] if asked => {
+                let share = |white, of: usize| matched.left_by(&parts[1 - of].0, white, &signal, &felt) / snr[of];
+                f64::min(share(a, 0), share(b, 1))
+            }
+            _ => 1.0,
+        };
         drop(matched);
         Self { flight, noise, kept, signal, felt, parts, snr, apart, left }
     }

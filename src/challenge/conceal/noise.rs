@@ -37,8 +37,8 @@ impl Noise {
         Self {
             awake_ng,
             asleep: between(rng, 0.55, 0.68),
-            red_share: between(rng, 0.0, 0.08),
-            red_s: log_between(rng, 100.0, 1500.0),
+            red_share: between(rng, 0.0, 0.06),
+            red_s: log_between(rng, 100.0, 500.0),
             slow_ng,
             slow_s: log_between(rng, 300.0, 10_800.0),
         }

@@ -22,12 +22,17 @@ fn the_same_seed_draws_the_same_case_and_another_seed_another() {
 
 #[test]
 fn a_clean_record_differs_from_its_simulation_by_the_noise_and_a_constant() {
-    let case = draw(Kind::Clean, 1);
+    for seed in 0..8 {
+        differs_by_noise(&draw(Kind::Clean, seed));
+    }
+}
+
+fn differs_by_noise(case: &Concealed) {
     let (clock, grid) =
-        (column(file(&case, "recording.csv"), "clock_s"), column(file(&case, "simulation.csv"), "clock_s"));
+        (column(file(case, "recording.csv"), "clock_s"), column(file(case, "simulation.csv"), "clock_s"));
     for (axis, name) in ["ax_ng", "ay_ng", "az_ng"].into_iter().enumerate() {
         let (recorded, simulated) =
-            (column(file(&case, "recording.csv"), name), column(file(&case, "simulation.csv"), name));
+            (column(file(case, "recording.csv"), name), column(file(case, "simulation.csv"), name));
         let mut left: Vec<f64> = clock
             .iter()
             .zip(&recorded)
@@ -61,4 +66,23 @@ fn drawn_effects_have_a_fair_snr_and_are_not_confused_with_themselves() {
 fn a_single_attitude_question_has_more_than_one_answer() {
     let case = draw(Kind::Single, 2);
     assert!(!case.truth.confusable.is_empty(), "{:?}", case.truth);
+}
+
+#[test]
+fn the_twenty_second_files_carry_the_signal() {
+    for seed in 0..12 {
+        let flight = Flight::draw(&mut ChaCha12Rng::seed_from_u64(seed), Freedom::default());
+        let fine = Signal::without(&flight, &[]).simulated;
+        let coarse: Series = (0..fine.len())
+            .map(|k| {
+                let (from, part) = (k / 4 * 4, (k % 4) as f64 / 4.0);
+                fine[from] * (1.0 - part) + fine[(from + 4).min(fine.len() - 1)] * part
+            })
+            .collect();
+        for (a, b) in record::window_means(&flight, &fine).iter().zip(&record::window_means(&flight, &coarse)) {
+            let rms = (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt();
+            // A thirtieth of the quietest noise: no finding on a clean record can come from the grid.
+            assert!(rms < 1.0, "seed {seed}: {rms} ng");
+        }
+    }
 }
