@@ -121,7 +121,7 @@ fn fly(mission: &Mission, to: SocketAddr, speed: Speed, seed: u64, over: &Cancel
     let (mut packetiser, mut framer) = (Packetiser::default(), Framer::new(link, 1, 0));
     let (mut frames, mut fresh, mut flown_s) = (Vec::new(), 0, 0u32);
     let start = Instant::now();
-    let mut send_down = |frames: &[Vec<u8>], flown_s: u32| -> Result<()> {
+    let send_down = |frames: &[Vec<u8>], flown_s: u32| -> Result<()> {
         if let Speed::Times(times) = speed {
             let due = start + Duration::from_secs_f64(f64::from(flown_s) / times);
             while Instant::now() < due && !over.is_cancelled() {

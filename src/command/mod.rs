@@ -1,6 +1,7 @@
 //! The commands of `oare`, one a file: arguments in, exit code out. The work is in the library.
 
 pub mod challenge;
+mod challenge_real;
 pub mod demo;
 pub mod diagnose;
 pub mod export;

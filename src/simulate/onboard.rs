@@ -93,7 +93,9 @@ fn sum(counts: &[i16]) -> i64 {
 fn trimming(sorted: &[i16]) -> (f64, f64) {
     let n = sorted.len();
     let (fifth, half) = (n / 5, n / 2);
-    let spread = |k: usize| (sum(&sorted[n - k..]) - sum(&sorted[..k])) as f64 / k as f64;
+    // Each mean rounded by itself, as on board: at a tie of the last digit sent it decides.
+    let mean = |counts: &[i16]| sum(counts) as f64 / counts.len() as f64;
+    let spread = |k: usize| mean(&sorted[n - k..]) - mean(&sorted[..k]);
     let wide = spread(half);
     if wide == 0.0 {
         return (0.0, 0.05);
