@@ -7,7 +7,7 @@ use std::fs::{self, File};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
@@ -23,6 +23,8 @@ use crate::pipeline::Settings;
 const FILE_OCTETS_MAX: u64 = 512 << 20;
 /// How often it is looked whether there is more.
 const TICK: Duration = Duration::from_millis(50);
+/// Products are taken up this often: at full speed a window is revised several times a second, and its newest revision is enough.
+const PRODUCTS_EVERY: Duration = Duration::from_secs(1);
 /// Messages taken from the hub at once.
 const AT_ONCE: usize = 1024;
 
@@ -82,11 +84,16 @@ impl Recorder {
     /// # Errors
     /// When a file cannot be written or the raw log cannot be read. The service goes on without a recording then, and says so.
     pub fn run(mut self, runtime: &Handle, finish: &CancellationToken) -> Result<(), RecordError> {
+        let mut products_read = Instant::now();
         loop {
             let finishing = finish.is_cancelled();
             let mut idle = true;
-            while self.frames()? | self.messages()? {
+            while self.frames()? {
                 idle = false;
+            }
+            if finishing || products_read.elapsed() > PRODUCTS_EVERY {
+                while self.messages()? {}
+                products_read = Instant::now();
             }
             if finishing {
                 return self.finish_file();
