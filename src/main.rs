@@ -22,6 +22,8 @@ enum Command {
     Simulate(command::simulate::Args),
     /// The service: dumps in at a TCP port, products out over HTTP and WebSocket.
     Serve(command::serve::Args),
+    /// The whole thing with nothing prepared: the service, and a simulated mission flown into it.
+    Demo(command::demo::Args),
     /// Sends dump files as a recorder playback would arrive.
     Replay(command::replay::Args),
     /// Products out of a data directory.
@@ -37,6 +39,7 @@ fn main() -> ExitCode {
         Command::Process(args) => command::process::run(args),
         Command::Simulate(args) => command::simulate::run(args),
         Command::Serve(args) => command::serve::run(args),
+        Command::Demo(args) => command::demo::run(args),
         Command::Replay(args) => command::replay::run(args),
         Command::Export(args) => command::export::run(args),
         Command::Diagnose(args) => command::diagnose::run(args),

@@ -2,6 +2,7 @@
 
 pub mod conceal;
 pub mod engine;
+pub mod real;
 pub mod run;
 pub mod score;
 pub mod seal;

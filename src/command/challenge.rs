@@ -28,6 +28,9 @@ pub struct Args {
     /// Winds, density waves and panel areas that the analyser's regressors do not have.
     #[arg(long)]
     other_physics: bool,
+    /// Draw from the real recordings below this folder instead of simulated ones.
+    #[arg(long)]
+    real: Option<PathBuf>,
     /// Bootstrap replicates per case; without them the table of nulls decides.
     #[arg(long, default_value_t = 0)]
     bootstrap: usize,
@@ -47,6 +50,9 @@ pub struct Args {
 
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if let Some(dir) = &args.real {
+        return super::challenge_real::run(dir, args.cases, args.seed, args.out.as_deref());
+    }
     let engine = Engine { bootstraps: args.bootstrap, seed: args.seed };
     let outcomes = match &args.open {
         Some(directory) => {
@@ -115,7 +121,7 @@ fn known(id: &str) -> anyhow::Result<&'static str> {
     all().find(|known| *known == id).with_context(|| format!("no effect or law `{id}`; there are: {}", there()))
 }
 
-fn bar(length: usize, doing: &'static str) -> ProgressBar {
+pub(super) fn bar(length: usize, doing: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg:>10} {bar:40} {pos}/{len} {elapsed} (left {eta})");
     let bar = ProgressBar::new(length as u64).with_message(doing);
     if let Ok(style) = style { bar.with_style(style) } else { bar }

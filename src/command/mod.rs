@@ -1,6 +1,8 @@
 //! The commands of `oare`, one a file: arguments in, exit code out. The work is in the library.
 
 pub mod challenge;
+mod challenge_real;
+pub mod demo;
 pub mod diagnose;
 pub mod export;
 pub mod process;
@@ -8,6 +10,7 @@ pub mod replay;
 pub mod serve;
 pub mod simulate;
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 /// Done.
@@ -31,7 +34,11 @@ pub fn done_in_part() -> ExitCode {
 /// Logs go to standard error; `RUST_LOG` chooses which.
 pub fn log_to_stderr() {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "info".into());
-    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    let _ = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(std::io::stderr)
+        .try_init();
 }
 
 /// The runtime of a service.

@@ -1,24 +1,33 @@
 //! `oare process`: dumps in, product files out; the same pipeline as the service, without sockets.
 
+use std::collections::HashSet;
 use std::fs;
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
-use oare_ground::ingest::wire::{PlaybackPart, PlaybackReader};
+use oare_ground::config::Config;
+use oare_ground::hub::{Body, Message};
+use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader, Verdict};
 use oare_ground::pipeline::calibration::KnownCalibration;
 use oare_ground::pipeline::station::replay;
-use oare_ground::pipeline::{PlaybackId, Settings, Station, files};
+use oare_ground::pipeline::{PlaybackId, Station, files};
+use oare_ground::record::{mcap_file::Recording, mcap_reader};
+use sha2::{Digest, Sha256};
 
 /// Arguments of `oare process`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Dump files, in the order in which they are to arrive.
+    /// Dump files, or recordings (.mcap) of ours, in the order in which they are to arrive.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Folder for the product files; made if need be.
     #[arg(long)]
     out: PathBuf,
+    /// Configuration file; STS-65 without it.
+    #[arg(long)]
+    config: Option<PathBuf>,
     /// Known bias laws and scale factors, taken instead of estimating them.
     #[arg(long)]
     calibration: Option<PathBuf>,
@@ -29,7 +38,13 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
-    let settings = Settings::sts65();
+    let settings = match super::serve::read_config(args.config) {
+        Ok(Config { settings, .. }) => settings,
+        Err(error) => {
+            eprintln!("oare process: {error:#}");
+            return Ok(super::unusable());
+        }
+    };
     let known = match &args.calibration {
         Some(path) => match read_calibration(path) {
             Ok(known) => Some(known),
@@ -40,18 +55,19 @@ pub fn run(args: Args) -> Result<ExitCode> {
         },
         None => None,
     };
-    let mut dumps = Vec::new();
+    let mut streams = Vec::new();
     for path in &args.files {
-        match fs::read(path) {
-            Ok(octets) => dumps.push(octets),
+        match read_stream(path, settings.link) {
+            Ok(stream) => streams.push(stream),
             Err(error) => {
-                eprintln!("oare process: cannot read {}: {error}", path.display());
+                eprintln!("oare process: {error:#}");
                 return Ok(super::unusable());
             }
         }
     }
-    let station = replay(&settings, known.as_ref(), |station| take_all(station, &settings, &dumps));
+    let station = replay(&settings, known.as_ref(), |station| take_all(station, &streams));
     write_products(&station, &args.out)?;
+    write_recording(&station, &streams, &args.out.join("recording.mcap"))?;
     summarise(&station, args.json)
 }
 
@@ -60,22 +76,67 @@ fn read_calibration(path: &Path) -> Result<KnownCalibration> {
     KnownCalibration::parse(&text).with_context(|| format!("cannot use {}", path.display()))
 }
 
-/// Takes every dump, a stream each.
-fn take_all(station: &mut Station, settings: &Settings, dumps: &[Vec<u8>]) {
-    let mut next = 0;
-    for dump in dumps {
-        let mut reader = PlaybackReader::new(settings.link);
-        let mut take = |part: PlaybackPart| match part {
-            PlaybackPart::Opened => {
-                next += 1;
-                station.open_playback(PlaybackId(next));
-            }
-            PlaybackPart::Arrival(arrival) => station.take(PlaybackId(next), &arrival),
-            PlaybackPart::Closed { bits } => station.close_playback(PlaybackId(next), bits),
-        };
-        reader.push(dump, &mut take);
-        reader.finish(&mut take);
+/// One stream, and the link it came down on.
+struct Stream {
+    link: LinkConfig,
+    octets: Vec<u8>,
+}
+
+/// A dump, or the frames of a recording, whose channel coding is removed already.
+fn read_stream(path: &Path, link: LinkConfig) -> Result<Stream> {
+    let octets = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    if !mcap_reader::is_mcap(&octets) {
+        return Ok(Stream { link, octets });
     }
+    let octets = mcap_reader::dump(&octets).with_context(|| format!("cannot use {}", path.display()))?;
+    Ok(Stream { link: LinkConfig { randomised: false, reed_solomon_interleave: None, ..link }, octets })
+}
+
+/// Reads every stream; parts come with the number of their playback.
+fn read_all(streams: &[Stream], mut hand_on: impl FnMut(u32, PlaybackPart)) {
+    let mut playback = 0;
+    for stream in streams {
+        let mut reader = PlaybackReader::new(stream.link);
+        let mut number = |part: PlaybackPart| {
+            playback += u32::from(part == PlaybackPart::Opened);
+            hand_on(playback, part);
+        };
+        stream.octets.chunks(1 << 16).for_each(|chunk| reader.push(chunk, &mut number));
+        reader.finish(&mut number);
+    }
+}
+
+fn take_all(station: &mut Station, streams: &[Stream]) {
+    read_all(streams, |playback, part| match part {
+        PlaybackPart::Opened => station.open_playback(PlaybackId(playback)),
+        PlaybackPart::Arrival(arrival) => station.take(PlaybackId(playback), &arrival),
+        PlaybackPart::Closed { bits } => station.close_playback(PlaybackId(playback), bits),
+    });
+}
+
+/// The raw frames, repeats left out, and the products.
+fn write_recording(station: &Station, streams: &[Stream], path: &Path) -> Result<()> {
+    let cannot = || format!("cannot write {}", path.display());
+    let file = fs::File::create(path).with_context(cannot)?;
+    let mut recording = Recording::begin(BufWriter::new(file), station.settings()).with_context(cannot)?;
+    let mut known = HashSet::new();
+    let mut written = Ok(());
+    read_all(streams, |playback, part| {
+        let PlaybackPart::Arrival(arrival) = part else { return };
+        let repeated = match arrival.verdict {
+            Verdict::Good(id) => !known.insert((id, Sha256::digest(&arrival.octets))),
+            Verdict::Refused(_) => false,
+        };
+        if !repeated && written.is_ok() {
+            written = recording.frame(playback, &arrival);
+        }
+    });
+    written.with_context(cannot)?;
+    for (seq, product) in (1..).zip(station.products()) {
+        recording.message(&Message::new(seq, Body::Window(*product))).with_context(cannot)?;
+    }
+    recording.finish().with_context(cannot)?;
+    Ok(())
 }
 
 fn write_products(station: &Station, out: &Path) -> Result<()> {

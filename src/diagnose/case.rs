@@ -138,6 +138,8 @@ pub struct Case {
     pub ancillary: Ancillary,
     /// The mission log, in order of time.
     pub events: Vec<Event>,
+    /// Windows left out because the simulation's grid is too coarse for its own signal there.
+    pub windows_too_rough: usize,
 }
 
 impl Header {
@@ -245,8 +247,14 @@ impl Case {
                 });
             }
         }
+        let before = kept.clock_s.len();
+        let smooth = smooth_enough(&kept, &simulation);
+        if smooth.clock_s.len() >= WINDOWS_MIN {
+            kept = smooth;
+        }
+        let windows_too_rough = before - kept.clock_s.len();
         events.sort_by(|a, b| a.clock_s.total_cmp(&b.clock_s));
-        Ok(Self { header, recording: kept, simulation, ancillary, events })
+        Ok(Self { header, recording: kept, simulation, ancillary, events, windows_too_rough })
     }
 
     /// Events of one kind as spans `[start_s, end_s]`.
@@ -259,12 +267,46 @@ fn within(recording: &Recording, span: [f64; 2]) -> Recording {
     let keep: Vec<usize> = (0..recording.clock_s.len())
         .filter(|&i| recording.clock_s[i] >= span[0] && recording.clock_s[i] <= span[1])
         .collect();
+    take(recording, &keep)
+}
+
+fn take(recording: &Recording, keep: &[usize]) -> Recording {
     let pick = |v: &Vec<f64>| keep.iter().map(|&i| v[i]).collect::<Vec<f64>>();
     Recording {
         clock_s: pick(&recording.clock_s),
         a_ng: std::array::from_fn(|k| pick(&recording.a_ng[k])),
         dev_ng: std::array::from_fn(|k| pick(&recording.dev_ng[k])),
     }
+}
+
+/// Share of the noise by which a straight line between grid points may miss the simulated signal.
+const ROUGHNESS_MAX: f64 = 0.5;
+
+/// The windows in which the simulation's grid resolves its own signal: between grid points it is known to about an eighth
+/// of the second difference, and where that is not small against the noise a comparison says nothing.
+fn smooth_enough(recording: &Recording, simulation: &Simulation) -> Recording {
+    let grid = &simulation.clock_s;
+    let noise: [f64; 3] = std::array::from_fn(|k| {
+        let mut steps: Vec<f64> = recording.a_ng[k].windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        steps.sort_by(f64::total_cmp);
+        steps[steps.len() / 2].max(1e-9)
+    });
+    let rough: Vec<bool> = (0..grid.len())
+        .map(|i| {
+            let [a, b] = [i.saturating_sub(1), (i + 1).min(grid.len() - 1)];
+            (0..3).any(|k| {
+                let m = &simulation.a_ng[k];
+                (m[a] - 2.0 * m[i] + m[b]).abs() / 8.0 > ROUGHNESS_MAX * noise[k]
+            })
+        })
+        .collect();
+    let touched = |t: f64| {
+        let first = grid.partition_point(|g| *g < t - HALF_WINDOW_S).saturating_sub(1);
+        let last = (grid.partition_point(|g| *g < t + HALF_WINDOW_S) + 1).min(grid.len());
+        rough[first..last].iter().any(|r| *r)
+    };
+    let keep: Vec<usize> = (0..recording.clock_s.len()).filter(|i| !touched(recording.clock_s[*i])).collect();
+    take(recording, &keep)
 }
 
 fn check_units(

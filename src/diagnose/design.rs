@@ -47,23 +47,15 @@ impl Column {
         let mut out = self.clone();
         for (a, b) in out.parts.iter_mut().zip(&other.parts) {
             let Some(b) = b else { continue };
-            match a {
-                Some(a) => {
-                    assert!(a.first == 0, "only a full column can be reduced");
-                    assert!(a.whitened.len() >= b.first + b.whitened.len(), "only a full column can be reduced");
-                    for (x, y) in a.whitened[b.first..].iter_mut().zip(&b.whitened) {
-                        *x -= factor * y;
-                    }
-                    a.constant -= factor * b.constant;
-                }
-                None => {
-                    *a = Some(Part {
-                        first: b.first,
-                        whitened: b.whitened.iter().map(|y| -factor * y).collect(),
-                        constant: -factor * b.constant,
-                    })
-                }
+            let part = a.get_or_insert_with(|| Part { first: b.first, whitened: Vec::new(), constant: 0.0 });
+            let first = part.first.min(b.first);
+            let end = (part.first + part.whitened.len()).max(b.first + b.whitened.len());
+            let mut whitened = vec![0.0; end - first];
+            whitened[part.first - first..part.first - first + part.whitened.len()].copy_from_slice(&part.whitened);
+            for (x, y) in whitened[b.first - first..].iter_mut().zip(&b.whitened) {
+                *x -= factor * y;
             }
+            *part = Part { first, whitened, constant: part.constant - factor * b.constant };
         }
         out
     }
@@ -71,8 +63,11 @@ impl Column {
     /// Whitened values of one axis with the constant's share removed; empty where the column is absent.
     pub fn projected(&self, axis: usize, frame: &Frame) -> Vec<f64> {
         match &self.parts[axis] {
-            Some(p) => p.whitened.iter().zip(&frame.ones[axis][p.first..]).map(|(x, o)| x - p.constant * o).collect(),
-            None => Vec::new(),
+            Some(p) => {
+                let value = |i: usize| i.checked_sub(p.first).and_then(|j| p.whitened.get(j)).copied().unwrap_or(0.0);
+                frame.ones[axis].iter().enumerate().map(|(i, o)| value(i) - p.constant * o).collect()
+            }
+            None => vec![0.0; frame.ones[axis].len()],
         }
     }
 }

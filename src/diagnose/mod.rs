@@ -28,3 +28,4 @@ pub mod solve;
 pub mod verdict;
 
 pub use analysis::{Analysis, Settings, analyse, diagnose};
+pub use answer::Diagnosis;

@@ -70,6 +70,11 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
             } else {
                 1.0
             };
+            let sigma = if p.name == "onset_s" && p.step > 0.0 {
+                sigma.max(onset_sigma(scene, frame, entries, set, out.len()) * inflation)
+            } else {
+                sigma
+            };
             let value = if p.log { m.theta[j].exp() } else { m.theta[j] };
             fit.parameters.push(Fitted {
                 name: p.name,
@@ -94,6 +99,35 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
         out.push(fit);
     }
     out
+}
+
+/// Windows on either side of an onset over which its posterior is scanned, and the spacing of the scan, s.
+const ONSET_SCAN_S: [f64; 2] = [600.0, 20.0];
+
+/// Standard error of the onset of member `i` about its fitted value, from its posterior: one window more or less can decide,
+/// so that the curvature at the peak says too little.
+fn onset_sigma(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: usize) -> f64 {
+    let Family::Listed(effect) = entries[set.members[i].entry].family else { return 0.0 };
+    let others = Set {
+        members: set.members.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, m)| m.clone()).collect(),
+        score: 0.0,
+    };
+    let chosen = others.chosen(frame);
+    let steps = (ONSET_SCAN_S[0] / ONSET_SCAN_S[1]) as i32;
+    let sizes = &entries[set.members[i].entry].sizes;
+    let scan: Vec<(f64, f64)> = (-steps..=steps)
+        .filter_map(|s| {
+            let shift = f64::from(s) * ONSET_SCAN_S[1];
+            let mut theta = set.members[i].theta;
+            theta[0] += shift;
+            let raws = (effect.signature)(scene, &theta)?.columns();
+            let columns: Vec<Column> = raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, *size)).collect();
+            Some((shift, chosen.gain(&columns)))
+        })
+        .collect();
+    let top = scan.iter().map(|s| s.1).fold(f64::NEG_INFINITY, f64::max);
+    let weight: f64 = scan.iter().map(|s| (s.1 - top).exp()).sum();
+    (scan.iter().map(|s| s.0 * s.0 * (s.1 - top).exp()).sum::<f64>() / weight).sqrt()
 }
 
 /// Covariance of all coefficients, then of all free nonlinear parameters, from the linearised joint fit.

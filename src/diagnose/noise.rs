@@ -301,3 +301,53 @@ pub fn simulate(noise: &AxisNoise, schedule: &Schedule, activity: &[f64], mut no
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cheap source of nearly normal numbers: twelve uniform ones (a linear congruence, Knuth's MMIX constants).
+    fn normals(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        let mut uniform = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
+    fn gappy() -> Schedule {
+        let clock: Vec<f64> = (0..4000).filter(|i| i % 190 > 3).map(|i| 25.0 * f64::from(i)).collect();
+        Schedule::new(&clock)
+    }
+
+    #[test]
+    fn what_the_filter_leaves_of_its_own_noise_is_white_and_of_unit_size_across_gaps_and_levels() {
+        let noise =
+            AxisNoise { white_ng: 100.0, short_ng: 30.0, short_tau_s: 120.0, slow_ng: 25.0, slow_tau_s: 3600.0 };
+        let schedule = gappy();
+        let activity: Vec<f64> = (0..schedule.len()).map(|i| if i > 1500 { 0.6 } else { 1.2 }).collect();
+        let x = simulate(&noise, &schedule, &activity, normals(3));
+        let w = Whitener::new(&noise, &schedule, &activity).whiten(&x);
+        let n = w.len() as f64;
+        let variance = dot(&w, &w) / n;
+        // Five standard errors of a variance and of an autocorrelation.
+        assert!((variance - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "{variance}");
+        for lag in 1..5 {
+            let r = w.iter().zip(&w[lag..]).map(|(a, b)| a * b).sum::<f64>() / n;
+            assert!(r.abs() < 5.0 / n.sqrt(), "lag {lag}: {r}");
+        }
+    }
+
+    #[test]
+    fn the_fit_recovers_white_and_slow_noise() {
+        let noise =
+            AxisNoise { white_ng: 100.0, short_ng: 25.0, short_tau_s: 110.0, slow_ng: 30.0, slow_tau_s: 3000.0 };
+        let schedule = gappy();
+        let activity = vec![1.0; schedule.len()];
+        let x = simulate(&noise, &schedule, &activity, normals(11));
+        let found = fit(&x, &schedule, &activity, None, 150).noise;
+        assert!((found.white_ng / 100.0 - 1.0).abs() < 0.1, "{found:?}");
+        assert!((found.slow_ng / 30.0).ln().abs() < 0.5, "{found:?}");
+    }
+}

@@ -491,10 +491,10 @@ fn clock(c: &mut Collector) {
             &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()],
         );
     }
-    for cycles in [0.25, 0.5, 0.75, 1.5, 2.5, 8.0, 12.0, 16.0] {
+    for cycles in (1..=40).map(|i| 0.05 * f64::from(i)).chain([2.5, 8.0, 12.0, 16.0]) {
         let rate = std::f64::consts::TAU * cycles / s.period_s;
         c.several(
-            format!("sin, cos at {cycles} cycles per orbit"),
+            format!("sin, cos at {cycles:.2} cycles per orbit"),
             "per_orbit_line",
             "a line of the spectrum",
             &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()],

@@ -19,8 +19,6 @@ pub const SET_MAX: usize = 4;
 const BEAM: usize = 4;
 /// Sets weighed each with its own noise.
 const FINALISTS: usize = 10;
-/// Log evidence below the best at which a set is no longer followed.
-const FOLLOW: f64 = 12.0;
 
 /// What a family is.
 #[derive(Clone, Copy)]

@@ -1,7 +1,8 @@
 //! From weighed hypotheses to what is said: consistent, explained, ambiguous or unexplained, with its figures.
 
 use super::answer::{
-    Alternative, Diagnosis, EffectAnswer, Fit, FitLevel, Hypothesis, Located, ParameterAnswer, UpperLimit, Verdict,
+    Alternative, Diagnosis, EffectAnswer, Fit, FitLevel, Hypothesis, Located, ParameterAnswer, SeparatingObservation,
+    UpperLimit, Verdict,
 };
 use super::catalogue::Effect;
 use super::design::{Chosen, Column, Frame};
@@ -15,6 +16,8 @@ use super::solve::{Library, Solution};
 const OPEN_MARGIN: f64 = 3.0;
 /// Log odds within which another set is as good, and the smaller of two nested sets is preferred.
 const EQUAL: f64 = 2.3;
+/// Log odds within which a set that does not hold the best one, nor is held by it, cannot be told from it.
+const RIVAL: f64 = 3.5;
 /// Posterior below which an alternative is not mentioned.
 const MENTION: f64 = 0.004;
 /// A remaining autocorrelation this unlikely makes the errors wider.
@@ -65,6 +68,12 @@ pub fn conclude(
     ladder.push(("nothing".into(), 0.0));
     ladder.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut notes = Vec::new();
+    if scene.case.windows_too_rough > 0 {
+        notes.push(format!(
+            "{} windows are left out: the simulation changes too fast there for its own grid",
+            scene.case.windows_too_rough
+        ));
+    }
     let listed = credible(scene, library, &solution.listed, &mut notes);
     let top = |sets: &[&Weighed]| sets.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior);
     let open: Vec<&Weighed> = solution.open.iter().collect();
@@ -193,7 +202,6 @@ fn is_nested(a: &Set, b: &Set) -> bool {
 }
 
 fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Best, listed: &[&Weighed]) {
-    let _ = scene;
     let top = listed[0].log_posterior;
     let total: f64 = listed.iter().map(|w| (w.log_posterior - top).exp()).sum();
     let posterior = |w: &Weighed| (w.log_posterior - top).exp() / total;
@@ -204,12 +212,15 @@ fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Best, l
     let others: Vec<&&Weighed> = listed.iter().filter(|w| w.set.key() != key).collect();
     let rivals: Vec<&&&Weighed> = others
         .iter()
-        .filter(|w| best.weighed.log_posterior - w.log_posterior < EQUAL && !is_nested(&w.set, &best.set))
+        .filter(|w| best.weighed.log_posterior - w.log_posterior < RIVAL && !is_nested(&w.set, &best.set))
         .collect();
-    if !rivals.is_empty() {
+    let twin = step_at_mass_change(scene, library, best);
+    if !rivals.is_empty() || twin.is_some() {
         answer.verdict = Verdict::Ambiguous;
         answer.cannot_tell_apart.push(ids(library, &best.set));
         answer.cannot_tell_apart.extend(rivals.iter().map(|w| ids(library, &w.set)));
+        answer.cannot_tell_apart.extend(twin);
+        answer.separating_observation = Some(separating(&answer.cannot_tell_apart));
     }
     answer.alternatives = others
         .iter()
@@ -221,6 +232,57 @@ fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Best, l
             delta_bic: 2.0 * (best.weighed.log_posterior - w.log_posterior),
         })
         .collect();
+}
+
+/// The set with its mass shift taken for a bias step at the same instant, when that fits as well: the instant is no
+/// argument for either, since what shifts a mass may shift a bias.
+fn step_at_mass_change(scene: &Scene, library: &Library, best: &Best) -> Option<Vec<String>> {
+    let entries = &library.entries;
+    let i = (0..best.set.members.len())
+        .find(|i| effect_of(entries, &best.set, *i).is_some_and(|e| e.id == "mass_shift"))?;
+    let step =
+        entries[..library.listed].iter().find(|e| matches!(e.family, Family::Listed(e) if e.id == "bias_step"))?;
+    let others = Set {
+        members: best.set.members.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, m)| m.clone()).collect(),
+        score: 0.0,
+    };
+    let chosen = others.chosen(&best.frame);
+    let gain = |entry: &Entry, effect: &Effect, theta: &super::catalogue::Theta| {
+        let raws = (effect.signature)(scene, theta).map(|s| s.columns()).unwrap_or_default();
+        let columns: Vec<Column> =
+            raws.iter().zip(&entry.sizes).map(|(raw, size)| best.frame.column(raw, *size)).collect();
+        chosen.gain(&columns)
+    };
+    let Family::Listed(step_effect) = step.family else { return None };
+    let m = &best.set.members[i];
+    let shift_effect = effect_of(entries, &best.set, i)?;
+    let lacking = gain(&entries[m.entry], shift_effect, &m.theta) - gain(step, step_effect, &m.theta);
+    (lacking < RIVAL).then(|| {
+        ids(library, &best.set)
+            .into_iter()
+            .map(|id| if id == "mass_shift" { "bias_step".to_string() } else { id })
+            .collect()
+    })
+}
+
+/// What would decide between sets: their kinds say which observation they answer to differently.
+fn separating(sets: &[Vec<String>]) -> SeparatingObservation {
+    let sensor = ["bias_step", "bias_drift", "temperature_bias"];
+    let held = |id: &str| sets.iter().any(|s| s.iter().any(|x| x == id));
+    let some_sensor = sensor.iter().any(|id| held(id));
+    let all_sensor = sets.iter().all(|s| s.iter().any(|x| sensor.contains(&x.as_str())));
+    if some_sensor && !all_sensor {
+        return SeparatingObservation {
+            kind: "table_flip".into(),
+            text: "Measure with the table turned by 180 degrees: what belongs to the sensor changes sign in body axes, a real acceleration does not.".into(),
+            gain: 0.0,
+        };
+    }
+    SeparatingObservation {
+        kind: "attitude".into(),
+        text: "Hold another attitude for six hours, the ram direction along a different body axis: the sets predict different axes then.".into(),
+        gain: 0.0,
+    }
 }
 
 fn effects(library: &Library, best: &Best, posterior: impl Fn(usize) -> f64) -> Vec<EffectAnswer> {

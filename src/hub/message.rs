@@ -100,6 +100,14 @@ pub enum Body {
 }
 
 impl Body {
+    /// Start of the window it is about.
+    pub fn window_start(&self) -> Option<Clock> {
+        match self {
+            Body::Window(product) | Body::Supersede(product, _) => Some(product.start),
+            Body::Second(_) | Body::Told { .. } => None,
+        }
+    }
+
     /// The topic it is told on.
     pub fn topic(&self) -> Topic {
         match self {

@@ -17,6 +17,8 @@ pub struct Reader {
     after: u64,
     /// A reader further behind than this many messages is told what it missed; `None`: never, it waits for the disk.
     behind_max: Option<u64>,
+    /// Leaves out messages about windows of which a later message is known.
+    newest_only: bool,
     head: watch::Receiver<u64>,
 }
 
@@ -39,7 +41,7 @@ pub enum Step {
 impl Hub {
     /// A reader of what comes after a message.
     pub fn reader(self: &Arc<Self>, topics: Topics, after: u64, behind_max: Option<u64>) -> Reader {
-        Reader { hub: self.clone(), topics, after, behind_max, head: self.head.subscribe() }
+        Reader { hub: self.clone(), topics, after, behind_max, newest_only: false, head: self.head.subscribe() }
     }
 
     /// What is known from a clock on, each window once and in its present revision, in the order of the messages about it; and the
@@ -78,6 +80,12 @@ impl Hub {
 }
 
 impl Reader {
+    /// This reader, for whom a window told of again while it was behind is told of once, by the newest message.
+    pub fn newest_only(mut self) -> Self {
+        self.newest_only = true;
+        self
+    }
+
     /// Number of the message up to which all is read.
     pub fn after(&self) -> u64 {
         self.after
@@ -107,11 +115,14 @@ impl Reader {
             }
         }
         if self.topics.iter().all(|topic| state.rings[topic as usize].dropped_through <= self.after) {
-            let messages = state.from_rings(self.topics, self.after, messages_max);
+            let mut messages = state.in_rings(self.topics, self.after, messages_max);
             self.after = match messages.last() {
                 Some(last) if messages.len() == messages_max => last.seq,
                 _ => head,
             };
+            if self.newest_only {
+                messages.retain(|message| state.is_newest(message.seq, message.body.window_start()));
+            }
             return Some(Step::Messages(messages));
         }
         let mut messages = Vec::new();
@@ -130,7 +141,11 @@ impl Reader {
             let last = entry.last_seq().min(first + room - 1);
             match &**entry {
                 Entry::Seconds { .. } => clocks.extend((first..=last).map(|seq| (seq, entry.clock_of(seq)))),
-                entry => messages.extend((first..=last).filter_map(|seq| state.from_journal(entry, seq))),
+                entry => {
+                    let newest_only = self.newest_only && matches!(entry, Entry::Windows { .. });
+                    let wanted = |seq: &u64| !newest_only || state.is_newest(*seq, Some(entry.clock_of(*seq)));
+                    messages.extend((first..=last).filter(wanted).filter_map(|seq| state.in_journal(entry, seq)));
+                }
             }
             self.after = last;
         }
@@ -146,7 +161,7 @@ impl Reader {
 
 impl State {
     /// Messages after a number, from the rings, merged by number.
-    fn from_rings(&self, topics: Topics, after: u64, messages_max: usize) -> Vec<Arc<Message>> {
+    fn in_rings(&self, topics: Topics, after: u64, messages_max: usize) -> Vec<Arc<Message>> {
         let mut messages = Vec::new();
         for topic in topics.iter() {
             let ring = &self.rings[topic as usize].messages;
@@ -158,8 +173,14 @@ impl State {
         messages
     }
 
+    /// Whether no later message is about the same window.
+    fn is_newest(&self, seq: u64, window_start: Option<Clock>) -> bool {
+        let held = window_start.and_then(|start| self.windows.get(&start));
+        held.is_none_or(|held| held.seq <= seq)
+    }
+
     /// A message of the past, with what is known of its window now.
-    fn from_journal(&self, entry: &Entry, seq: u64) -> Option<Arc<Message>> {
+    fn in_journal(&self, entry: &Entry, seq: u64) -> Option<Arc<Message>> {
         let body = match entry {
             Entry::Told { topic, clock, json, .. } => Body::Told { topic: *topic, clock: *clock, json: json.clone() },
             Entry::Windows { supersedes, .. } => {

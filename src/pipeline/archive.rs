@@ -71,6 +71,9 @@ impl Archive {
             }
             return Addition::Conflict { replaced };
         }
+        if cell.capacity() == 0 {
+            cell.reserve_exact((CELL_TENTHS / RECORD_TENTHS) as usize);
+        }
         cell.insert(at, acc);
         Addition::New
     }

@@ -84,7 +84,8 @@ fn measured(window: &Window, axis: Axis, range: Range, counts: &AxisWindow, poli
         temperature_c: window.temperature_c,
         trimmed_counts: counts.estimate.mean,
         mean_counts: counts.estimate.plain_mean,
-        noise_counts: counts.estimate.independent_standard_error() * policy.correlated_samples.sqrt(),
+        independent_counts: counts.estimate.independent_standard_error(),
+        noise_factor: policy.correlated_samples.sqrt(),
     }
 }
 

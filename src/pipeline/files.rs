@@ -6,12 +6,13 @@ use std::fmt::Write;
 
 use serde_json::{Map, Value, json};
 
-use super::calibration::{Anomaly, Bias, BiasMeasurement, Calibration};
+use super::calibration::Anomaly;
+pub use super::calibration_file::{calibration_json, version_json};
 use super::ledger::{Account, PlaybackAccount, SecondSet};
 use super::product::{BodyVector, Product};
 use super::settings::Settings;
 use super::station::Station;
-use crate::telemetry::{Axis, Range};
+use crate::telemetry::Range;
 
 /// The columns of `windows.csv`.
 pub const WINDOW_COLUMNS: [&str; 31] = [
@@ -110,55 +111,6 @@ fn word_cell(csv: &mut String, word: &str) {
 pub fn rounded(value: f64, decimals: usize) -> f64 {
     let scale = 10f64.powi(decimals as i32);
     (value * scale).round() / scale + 0.0
-}
-
-/// `calibration.json`.
-pub fn calibration_json(station: &Station) -> Value {
-    let derived = station.derived();
-    json!({
-        "measurements": derived.measurements.iter().map(measurement_json).collect::<Vec<_>>(),
-        "current": derived.current().map(version_json),
-        "versions": derived.timeline.iter().map(|c| json!({
-            "version": c.version, "known_since_clock_s": c.known_since.seconds(),
-        })).collect::<Vec<_>>(),
-    })
-}
-
-fn measurement_json(measurement: &BiasMeasurement) -> Value {
-    json!({
-        "axis": measurement.axis.letter(),
-        "range": measurement.range.letter(),
-        "clock_s": rounded(measurement.clock_s, 1),
-        "counts": rounded(measurement.counts, 4),
-        "sigma_counts": rounded(measurement.sigma_counts, 4),
-        "temperature_c": rounded(measurement.temperature_c, 4),
-    })
-}
-
-/// One version of the calibration.
-pub fn version_json(calibration: &Calibration) -> Value {
-    let mut axes = Map::new();
-    for axis in Axis::ALL {
-        let mut ranges = Map::new();
-        for range in Range::ALL {
-            let (i, j) = (axis.index(), range.index());
-            let scale = calibration.scale[i][j];
-            let bias = match &calibration.bias[i][j] {
-                None => Value::Null,
-                Some(Bias::Known(law)) => json!({"form": "known law", "a": law.a, "t_h": law.t_h}),
-                Some(Bias::Interpolated(points)) => json!({"form": "interpolated", "points": points.len()}),
-            };
-            ranges.insert(
-                range.letter().into(),
-                json!({
-                    "bias": bias,
-                    "scale": {"correction": scale.correction, "sigma": scale.sigma, "provenance": scale.provenance.word()},
-                }),
-            );
-        }
-        axes.insert(axis.letter().into(), Value::Object(ranges));
-    }
-    json!({"version": calibration.version, "known_since_clock_s": calibration.known_since.seconds(), "axes": axes})
 }
 
 /// `anomalies.json`.

@@ -6,6 +6,7 @@
 pub mod archive;
 pub mod axes;
 pub mod calibration;
+pub mod calibration_file;
 pub mod derive;
 pub mod files;
 pub mod frames;

@@ -98,6 +98,6 @@ pub struct WindowPolicy {
 
 impl Default for WindowPolicy {
     fn default() -> Self {
-        Self { trim: TrimLaw::default(), samples_min: 100, correlated_samples: 9.0 }
+        Self { trim: TrimLaw::default(), samples_min: 100, correlated_samples: 7.9 }
     }
 }

@@ -64,6 +64,8 @@ pub struct Station {
     touched: BTreeSet<i64>,
     /// Whether anything that calibration depends on is new.
     calibration_touched: bool,
+    /// Whether windows are new that the checks of the calibration look at; they wait for [`Station::flush`].
+    checks_touched: bool,
     /// Windows whose product changed and was not announced.
     unannounced: BTreeSet<i64>,
     announced: BTreeMap<i64, Revision>,
@@ -96,6 +98,7 @@ impl Station {
             products: BTreeMap::new(),
             touched: BTreeSet::new(),
             calibration_touched: true,
+            checks_touched: false,
             unannounced: BTreeSet::new(),
             announced: BTreeMap::new(),
             announced_gaps: BTreeSet::new(),
@@ -202,8 +205,9 @@ impl Station {
                 self.ledger.seconds.add(clock);
                 self.touched.insert(cell_of(clock));
                 self.calibration_touched |= mode != Mode::Normal;
+                self.checks_touched = true;
             }
-            None => self.calibration_touched = true,
+            None => self.checks_touched = true,
         }
     }
 
@@ -234,6 +238,7 @@ impl Station {
 
     /// As [`Station::settle`], and announces every window and gap: nothing more is coming for now.
     pub fn flush(&mut self) -> Vec<Change> {
+        self.calibration_touched |= std::mem::take(&mut self.checks_touched);
         let mut changes = self.settle();
         let rest: Vec<i64> = self.unannounced.iter().copied().collect();
         changes.extend(self.announce(rest));
@@ -263,7 +268,8 @@ impl Station {
         if !std::mem::take(&mut self.calibration_touched) {
             return false;
         }
-        let derived = calibration::derive(&self.archive, &self.settings, self.known.as_ref());
+        let derived =
+            calibration::derive(&self.archive, &self.windows, &self.settings, self.known.as_ref(), Some(&self.derived));
         let changed =
             derived.current() != self.derived.current() || derived.range_corrections != self.derived.range_corrections;
         for anomaly in derived.anomalies.iter().filter(|anomaly| !self.derived.anomalies.contains(anomaly)) {

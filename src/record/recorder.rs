@@ -1,7 +1,7 @@
 //! Records what comes in, as it becomes durable and is published.
 //!
 //! The recorder reads at its own pace, frames from the raw log and products from the hub, so it holds nobody up and misses
-//! nothing. A file that a crash left unfinished is dropped, and its span recorded anew.
+//! nothing; a window whose revisions came faster than they could be written is written in its newest one. A file that a crash left unfinished is dropped, and its span recorded anew.
 
 use std::fs::{self, File};
 use std::io::BufWriter;
@@ -73,7 +73,7 @@ impl Recorder {
             at = path.file_name().and_then(|name| end_of(name.to_str()?)).map_or(at, |end| at.max(end));
         }
         let topics = Topics::ALL.without(Topic::Raw);
-        let reader = hub.reader(topics, at.seq, None);
+        let reader = hub.reader(topics, at.seq, None).newest_only();
         Ok(Self { directory, settings: settings.clone(), log, reader, board, at, open: None })
     }
 

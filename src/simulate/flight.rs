@@ -435,12 +435,13 @@ impl Flight<'_> {
     fn housekeeping(&mut self, acc: &AccRecord, temperature_c: f64) -> Housekeeping {
         let (level_v, scatter_v) = BUS_V;
         let bus_v = level_v + scatter_v * self.clocks.random_range(-1.7..1.7);
-        let hundredths = |c: f64| (c * 100.0).round() / 100.0;
+        // As the fields hold them, so that what is sent and what is read are one.
+        let hundredths = |c: f64| (c * 100.0).round() * 0.01;
         Housekeeping {
             clock: acc.clock,
             sensor_temperature_c: hundredths(temperature_c),
             electronics_temperature_c: hundredths(temperature_c + ELECTRONICS_ABOVE_C),
-            bus_v: (bus_v * 1000.0).round() / 1000.0,
+            bus_v: (bus_v * 1000.0).round() * 0.001,
             data_status: crate::ingest::wire::record::data_status(acc),
             ranges: acc.ranges,
             bias_calibrations: self.counters.bias_done,

@@ -2,6 +2,7 @@
 
 mod api;
 mod bad_input;
+mod dashboard;
 mod layering;
 mod live;
 mod samples;

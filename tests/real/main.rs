@@ -1,6 +1,7 @@
 //! Real recordings, measured by others; skipped, loudly, where they are not at hand.
 
 mod orbits;
+mod sensors;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -31,4 +32,9 @@ fn diagnose(folder: &str, overrides: &[&str]) -> Option<Answer> {
     };
     let files: BTreeMap<String, String> = case.files().into_iter().map(read).collect();
     Some(measured::diagnose(&case, &files).expect("an answer"))
+}
+
+/// Ids of the effects, in order.
+fn ids(answer: &Answer) -> Vec<&str> {
+    answer.effects.iter().map(|e| e.id.as_str()).collect()
 }

@@ -1,5 +1,6 @@
 //! The simulator and its physics against the sample data, which others made.
 
+mod calibration;
 mod onboard;
 mod open_cases;
 

@@ -181,3 +181,24 @@ pub fn logged(scene: &Scene, kind: &str) -> Option<Vec<f64>> {
     let windows = share.iter().filter(|s| **s > 0.0).count();
     (windows >= 2 && windows + 2 <= share.len()).then_some(share)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_entry_is_whole_and_named_once() {
+        for (i, e) in ALL.iter().enumerate() {
+            assert!(ALL[..i].iter().all(|other| other.id != e.id), "{} twice", e.id);
+            assert!(
+                !e.equation.is_empty() && !e.source.is_empty() && !e.why.is_empty() && !e.mistaken_for.is_empty(),
+                "{}",
+                e.id
+            );
+            assert!(!e.linear.is_empty() || !e.nonlinear.is_empty(), "{} has nothing to fit", e.id);
+            assert!(e.linear.iter().all(|l| l.size > 0.0 && l.size_max > 2.0 * l.size), "{}: sizes", e.id);
+            assert!(e.nonlinear.len() <= 2 && e.log_prior < 0.0, "{}", e.id);
+            assert_eq!(by_id(e.id).map(|x| x.name), Some(e.name));
+        }
+    }
+}

@@ -116,7 +116,9 @@ fn common(term: Term, name: &str, rows: &[Vec<Estimate>], k: usize) -> Parameter
         let mean = each.iter().map(|e| e.value * e.sigma.powi(-2)).sum::<f64>() / weight;
         // Satellites disagree by more than their own errors say; their scatter is then the error.
         let chi2 = each.iter().map(|e| ((e.value - mean) / e.sigma).powi(2)).sum::<f64>() / (count - 1.0);
-        return parameter(name, mean, (chi2.max(1.0) / weight).sqrt(), term.unit());
+        // Satellites of one constellation share what is unlisted: their number does not make the mean better than one.
+        let own = median(each.iter().map(|e| e.sigma));
+        return parameter(name, mean, (chi2.max(1.0) / weight).sqrt().max(own), term.unit());
     }
     let own = median(each.iter().map(|e| e.sigma));
     let sigma = 1.2533 * scatter(&values).max(own) / count.sqrt();

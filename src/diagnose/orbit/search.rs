@@ -5,11 +5,12 @@
 //! the richer model: residuals of an orbit are smooth for hours, and counting every epoch would find a term in anything.
 //! Not here: words and figures for the reader (see `report`).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::arc::{Arc, ArcFit};
-use super::forces::{Baseline, Environment, Term};
+use super::forces::{Baseline, Environment, Moment, Term};
 use crate::diagnose::measured::spread::{median, memory};
+use crate::physics::integrator::State;
 
 /// Evidence that all arcs together must give for a term: odds of one in 8,000 for chance at twice the log.
 pub const SCORE_MIN: f64 = 18.0;
@@ -20,6 +21,9 @@ const SCORE_ARC_MAX: f64 = 100.0;
 const EXCESS_MAX: f64 = 4.0;
 /// Where there is no air, drag is no candidate, m.
 const AIR_TOP_M: f64 = 1.5e6;
+/// The size of those unlisted accelerations against which a known pull can be weighed (tides' finer terms, the Moon's
+/// analytic place, radiation from the Earth), m/s^2.
+const UNLISTED_M_S2: f64 = 3e-10;
 const STEPS_MAX: usize = 10;
 
 /// What is to be explained.
@@ -119,24 +123,25 @@ impl Problem {
         Search { levels, first_scores, refused }
     }
 
-    /// Drop terms of the last level that it can do without; the way there is then walked again without them.
+    /// Drop terms that the last level can do without, and walk the way there once more in the catalogue's order, large
+    /// and general terms first, so that every step of the answer stands on what is known by then.
     fn look_back(&self, levels: Vec<Level>) -> Vec<Level> {
-        let accepted = levels[levels.len() - 1].accepted.clone();
-        if accepted.len() < 2 {
+        let last = &levels[levels.len() - 1];
+        if last.accepted.len() < 2 {
             return levels;
         }
-        let last = &levels[levels.len() - 1];
-        let needless = |(term, _): &&(Term, f64)| !term.is_known_size() && self.loss_without(last, *term) < SCORE_MIN;
-        let dropped: Vec<Term> = accepted.iter().filter(needless).map(|(term, _)| *term).collect();
-        if dropped.is_empty() {
+        let needed = |(term, _): &&(Term, f64)| term.is_known_size() || self.loss_without(last, *term) >= SCORE_MIN;
+        let mut kept: Vec<(Term, f64)> = last.accepted.iter().filter(needed).copied().collect();
+        kept.sort_by_key(|(term, _)| *term);
+        if kept == last.accepted {
             return levels;
         }
         let mut walked = vec![levels[0].clone()];
-        for (term, score) in accepted.iter().filter(|(term, _)| !dropped.contains(term)) {
+        for (term, score) in kept {
             let level = &walked[walked.len() - 1];
             let mut accepted = level.accepted.clone();
-            accepted.push((*term, *score));
-            let next = self.fit(&with(&level.baseline, *term), accepted, Some(&level.fits));
+            accepted.push((term, score));
+            let next = self.fit(&with(&level.baseline, term), accepted, Some(&level.fits));
             walked.push(next);
         }
         walked
@@ -284,11 +289,23 @@ pub fn estimates(problem: &Problem, level: &Level, i: usize, term: Term) -> Vec<
     let rows = left.len() as f64;
     // The stated accuracy is a floor: residuals below it are luck, or a filter's smoothing.
     let variance = (left.norm_squared() / (rows - unknowns).max(1.0)).max(0.25 * problem.sigma_m * problem.sigma_m);
+    let systematic = if term.is_known_size() { UNLISTED_M_S2 / size_m_s2(problem, arc, term) } else { 0.0 };
     let one = |j: usize| Estimate {
         value: (start[j] + step[j]) * term.scale(),
-        sigma: (variance * red * inverse[(j, j)]).max(0.0).sqrt() * term.scale(),
+        sigma: ((variance * red * inverse[(j, j)]).max(0.0) * term.scale().powi(2) + systematic * systematic).sqrt(),
     };
     (0..k).map(one).collect()
+}
+
+/// Rms of a term's acceleration along an arc.
+fn size_m_s2(problem: &Problem, arc: &Arc, term: Term) -> f64 {
+    let stride = (arc.fitted / 24).max(1);
+    let at = |i: usize| {
+        let state = State { r: arc.observed_m[i], v: Vector3::zeros() };
+        Moment::new(&problem.environment, arc.t_s[i], &state).columns(&problem.environment, term)[0].norm_squared()
+    };
+    let sizes: Vec<f64> = (0..arc.fitted).step_by(stride).map(at).collect();
+    (sizes.iter().sum::<f64>() / sizes.len().max(1) as f64).sqrt().max(1e-300)
 }
 
 fn is_in(baseline: &Baseline, term: Term) -> bool {

@@ -1,5 +1,8 @@
 //! A calibration as it is applied: a = (counts - bias) x SF_N x SF_C, and the errors of each part.
 
+use super::bias_law::BiasFit;
+use super::noise::NoiseFactors;
+use super::settling::Transient;
 use crate::telemetry::{Axis, Range};
 use crate::units::{Clock, MissionTime};
 
@@ -12,15 +15,18 @@ pub enum Provenance {
     CarriedOver,
     /// From configuration.
     Configured,
+    /// From the measurement in range B.
+    FromRangeB,
 }
 
 impl Provenance {
-    /// `measured`, `carried_over`, `configured`.
+    /// `measured`, `carried_over`, `configured`, `from_range_b`.
     pub const fn word(self) -> &'static str {
         match self {
             Self::Measured => "measured",
             Self::CarriedOver => "carried_over",
             Self::Configured => "configured",
+            Self::FromRangeB => "from_range_b",
         }
     }
 }
@@ -47,24 +53,16 @@ impl BiasLaw {
 pub enum Bias {
     /// A law known beforehand, taken as exact.
     Known(BiasLaw),
-    /// Measured values, interpolated linearly in time and held at the ends: clock s, counts, standard error.
-    Interpolated(Vec<[f64; 3]>),
+    /// Fitted to the measurements.
+    Fitted(Box<BiasFit>),
 }
 
 impl Bias {
     /// Bias and its standard error, counts; and whether the clock lies outside the measurements.
-    fn at(&self, clock_s: f64, met_h: f64, temperature_c: f64) -> (f64, f64, bool) {
+    fn at(&self, met_h: f64, temperature_c: f64) -> (f64, f64, bool) {
         match self {
             Bias::Known(law) => (law.counts(met_h, temperature_c), 0.0, false),
-            Bias::Interpolated(points) => {
-                let after = points.partition_point(|point| point[0] <= clock_s);
-                let outside = after == 0 || after == points.len();
-                let (left, right) = (points[after.saturating_sub(1)], points[after.min(points.len() - 1)]);
-                let span_s = right[0] - left[0];
-                let weight = if span_s > 0.0 { (clock_s - left[0]) / span_s } else { 0.0 };
-                let counts = left[1] + weight * (right[1] - left[1]);
-                (counts, ((1.0 - weight) * left[2]).hypot(weight * right[2]), outside)
-            }
+            Bias::Fitted(fit) => fit.at(met_h, temperature_c),
         }
     }
 }
@@ -110,8 +108,10 @@ pub struct Measured {
     pub trimmed_counts: f64,
     /// Plain mean, counts.
     pub mean_counts: f64,
-    /// Standard error of the trimmed mean from the noise, counts.
-    pub noise_counts: f64,
+    /// Standard error of the trimmed mean if its samples were independent, counts.
+    pub independent_counts: f64,
+    /// Factor from independent to true, where the calibration has none.
+    pub noise_factor: f64,
 }
 
 /// One version of the calibration of all axes and ranges.
@@ -133,20 +133,38 @@ pub struct Calibration {
     pub systematic_bias_ng: f64,
     /// Systematic error of the scale factor, relative.
     pub systematic_scale: f64,
+    /// Noise of the windows, from the windows; None with a calibration known beforehand and nothing received.
+    pub noise: Option<NoiseFactors>,
+    /// Settling transients of Y and Z that were taken away from the bias measurements.
+    pub settling: Option<[Transient; 2]>,
 }
 
 impl Calibration {
+    /// Bias of an axis and range, counts; None when there is none yet.
+    pub fn bias_at(&self, axis: Axis, range: Range, clock_s: f64, temperature_c: f64) -> Option<f64> {
+        let bias = self.bias[axis.index()][range.index()].as_ref()?;
+        Some(bias.at(self.time.met_h(clock_s), temperature_c).0)
+    }
+
+    /// Bias and its standard error, counts.
+    pub fn bias_and_error(&self, axis: Axis, range: Range, clock_s: f64, temperature_c: f64) -> Option<[f64; 2]> {
+        let bias = self.bias[axis.index()][range.index()].as_ref()?;
+        let (counts, sigma, _) = bias.at(self.time.met_h(clock_s), temperature_c);
+        Some([counts, sigma])
+    }
+
     /// Counts to acceleration; None when this axis and range has no bias yet.
     pub fn apply(&self, measured: &Measured) -> Option<Calibrated> {
         let (axis, range) = (measured.axis.index(), measured.range.index());
         let bias = self.bias[axis][range].as_ref()?;
         let met_h = self.time.met_h(measured.clock_s);
-        let (bias_counts, bias_sigma, extrapolated) = bias.at(measured.clock_s, met_h, measured.temperature_c);
+        let (bias_counts, bias_sigma, extrapolated) = bias.at(met_h, measured.temperature_c);
         let scale = self.scale[axis][range];
         let ng_per_count = self.resolution_ng[axis][range] * scale.correction;
         let trimmed_ng = (measured.trimmed_counts - bias_counts) * ng_per_count;
         let scale_ng = trimmed_ng * scale.sigma / scale.correction;
-        let counts_ng = ng_per_count * measured.noise_counts.hypot(bias_sigma);
+        let factor = self.noise.map_or(measured.noise_factor, |noise| noise.factor[axis]);
+        let counts_ng = ng_per_count * (factor * measured.independent_counts).hypot(bias_sigma);
         Some(Calibrated {
             trimmed_ng,
             mean_ng: (measured.mean_counts - bias_counts) * ng_per_count,

@@ -89,6 +89,8 @@ impl KnownCalibration {
             resolution_ng: self.resolution_ng.unwrap_or(settings.instrument.resolution_ng),
             systematic_bias_ng: settings.instrument.systematic_bias_ng,
             systematic_scale: settings.instrument.systematic_scale,
+            noise: None,
+            settling: None,
         }
     }
 }

@@ -3,31 +3,74 @@
 //! A calibration has two times: the span it is valid for, and the instrument clock since which it can be known. The timeline
 //! of versions is a function of the archive and the settings; the arrival of the telemetry plays no part in it.
 
+pub mod accuracy;
 mod anomaly;
 mod apply;
+pub mod bias_law;
+mod findings;
 mod known;
+pub mod misreport;
+pub mod noise;
+pub mod one_sided;
+pub mod saturation;
+pub mod scale_factor;
+pub mod sequence;
+pub mod settling;
+pub mod time_correlation;
 mod two_position;
+mod version;
+
+use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 pub use anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 pub use apply::{Bias, BiasLaw, Calibrated, Calibration, Measured, Provenance, Scale};
 pub use known::{KnownCalibration, KnownCalibrationError};
-pub use two_position::{BiasMeasurement, measure};
+pub use two_position::BiasMeasurement;
+pub use version::Shift;
 
+use self::accuracy::AxisAccuracy;
+use self::noise::{NoiseFactors, NoiseHistory};
+use self::one_sided::OneSided;
+use self::scale_factor::{ScaleMeasurement, ScaleSequence};
+use self::sequence::Hold;
+use self::time_correlation::TimeCorrelation;
+use self::version::{Material, version};
 use super::archive::Archive;
 use super::settings::Settings;
+use super::window::Window;
+use crate::telemetry::{Axis, Range};
 use crate::units::Clock;
+
+/// Calibrations further apart than this are two, tenths of a second: one lasts 15 min, with its scale part 37.
+const CALIBRATION_APART_TENTHS: i64 = 36_000;
 
 /// Everything that calibration and its checks derive from an archive.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Derived {
-    /// Bias measurements, in order of time.
+    /// Bias measurements as the latest version sees them, in order of time.
     pub measurements: Vec<BiasMeasurement>,
+    /// Scale sequences in order of time, and what the latest version makes of each.
+    pub scales: Vec<(ScaleSequence, Option<ScaleMeasurement>)>,
+    /// Level shifts in the scale calibrations of range C, by axis.
+    pub shifts: [Shift; 3],
     /// One version per completed calibration, in the order in which they became known.
     pub timeline: Vec<Calibration>,
+    /// The latest version estimated from the telemetry, also where a known calibration is used instead.
+    pub estimated: Option<Calibration>,
     /// What went wrong, in order of time.
     pub anomalies: Vec<Anomaly>,
     /// Spans in which the records name a wrong range.
     pub range_corrections: Vec<RangeCorrection>,
+    /// On-board estimates against the samples.
+    pub one_sided: OneSided,
+    /// Instrument clock against UTC.
+    pub time_correlation: TimeCorrelation,
+    /// The accuracy analysis in range C.
+    pub accuracy: [Option<AxisAccuracy>; 3],
+    /// What each version of the estimated timeline was made from, so that it need not be made again.
+    signatures: Vec<u64>,
+    estimates: Vec<Calibration>,
 }
 
 impl Derived {
@@ -42,12 +85,152 @@ impl Derived {
     }
 }
 
-/// Derives calibration and anomalies. With a known calibration, that one is used for every window instead.
-pub fn derive(archive: &Archive, settings: &Settings, known: Option<&KnownCalibration>) -> Derived {
-    let measurements = measure(archive, settings);
-    let timeline = match known {
-        Some(known) => vec![known.calibration(settings)],
-        None => two_position::timeline(&measurements, settings),
+/// Derives calibration and anomalies. With a known calibration, that one is used for every window instead. `previous` only saves
+/// work: versions whose material did not change are taken from it.
+pub fn derive(
+    archive: &Archive,
+    windows: &BTreeMap<i64, Window>,
+    settings: &Settings,
+    known: Option<&KnownCalibration>,
+    previous: Option<&Derived>,
+) -> Derived {
+    let law = &settings.window.trim;
+    let holds = sequence::holds(archive, windows);
+    let pairs = two_position::pairs(&holds);
+    let scales = scale_factor::sequences(archive, &holds, law);
+    let history = NoiseHistory::new(windows, &settings.instrument.resolution_ng);
+    let configured = settings.window.correlated_samples.sqrt();
+    let material = Material { pairs: &pairs, scales: &scales, settings };
+    let mut derived = Derived { scales: scales.iter().map(|s| (s.clone(), None)).collect(), ..Derived::default() };
+    let ends = ends(&pairs, &scales);
+    for (n, known_since) in ends.iter().enumerate() {
+        let noise = history.at(*known_since, configured);
+        let signature = signature(&holds, &scales, *known_since, &noise, settings);
+        let held = previous.filter(|p| p.signatures.get(n) == Some(&signature));
+        derived.signatures.push(signature);
+        let is_last = n + 1 == ends.len();
+        match held {
+            Some(previous) if !is_last => derived.estimates.push(previous.estimates[n].clone()),
+            Some(previous) if previous.signatures.len() == ends.len() => {
+                derived.estimates.push(previous.estimates[n].clone());
+                derived.measurements = previous.measurements.clone();
+                derived.shifts = previous.shifts;
+                derived.scales = previous.scales.clone();
+            }
+            _ => {
+                let made = version(n as u32 + 1, *known_since, noise, &material);
+                derived.estimates.push(made.calibration);
+                if is_last {
+                    derived.measurements = made.measurements;
+                    derived.shifts = made.shifts;
+                    derived.scales.iter_mut().zip(made.scales).for_each(|(held, made)| held.1 = made);
+                }
+            }
+        }
+    }
+    derived.estimated = derived.estimates.last().cloned();
+    derived.timeline = match known {
+        Some(known) => {
+            let latest = windows.values().next_back().map_or(Clock::from_tenths(0), |w| w.known_since);
+            vec![Calibration { noise: Some(history.at(latest, configured)), ..known.calibration(settings) }]
+        }
+        None => derived.estimates.clone(),
     };
-    Derived { measurements, timeline, anomalies: Vec::new(), range_corrections: Vec::new() }
+    derived.one_sided = one_sided::compare(archive, law);
+    derived.time_correlation = time_correlation::correlate(archive);
+    derived.accuracy = Axis::ALL.map(|axis| analyse(axis, &derived));
+    find_anomalies(archive, windows, &mut derived);
+    derived
+}
+
+/// Clocks at which a calibration was complete, or as far as it came down.
+fn ends(pairs: &[two_position::Pair<'_, '_>], scales: &[ScaleSequence]) -> Vec<Clock> {
+    let mut known: Vec<Clock> =
+        pairs.iter().map(|p| p.opposite.last()).chain(scales.iter().map(|s| s.span[1])).collect();
+    known.sort_unstable();
+    let mut ends: Vec<Clock> = Vec::new();
+    for clock in known {
+        match ends.last_mut() {
+            Some(end) if clock.tenths() - end.tenths() < CALIBRATION_APART_TENTHS => *end = clock,
+            _ => ends.push(clock),
+        }
+    }
+    ends
+}
+
+/// Hash of everything a version is made from.
+fn signature(
+    holds: &[Hold<'_>],
+    scales: &[ScaleSequence],
+    known_since: Clock,
+    noise: &NoiseFactors,
+    settings: &Settings,
+) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    known_since.hash(&mut hasher);
+    for hold in holds.iter().filter(|hold| hold.start() <= known_since) {
+        for record in &hold.records {
+            (record.clock, &record.counts, record.temperature_c.to_bits(), record.ranges).hash(&mut hasher);
+        }
+    }
+    for scale in scales.iter().filter(|scale| scale.span[1] <= known_since) {
+        scale.rate_rad_s.map(f64::to_bits).hash(&mut hasher);
+        scale.refusal.hash(&mut hasher);
+    }
+    noise.factor.map(f64::to_bits).hash(&mut hasher);
+    noise.half_drift_variance_ng2.map(f64::to_bits).hash(&mut hasher);
+    settings.time.liftoff_clock_s.to_bits().hash(&mut hasher);
+    hasher.finish()
+}
+
+fn find_anomalies(archive: &Archive, windows: &BTreeMap<i64, Window>, derived: &mut Derived) {
+    let mut anomalies = Vec::new();
+    if let Some(calibration) = derived.current() {
+        for (anomaly, corrections) in misreport::find(archive, windows, calibration) {
+            anomalies.push(anomaly);
+            derived.range_corrections.extend(corrections);
+        }
+    }
+    if let Some(settling) = derived.estimated.as_ref().and_then(|c| c.settling.as_ref()) {
+        anomalies.extend(findings::settling(settling));
+    }
+    anomalies.extend(findings::one_sided(&derived.one_sided));
+    anomalies.extend(derived.time_correlation.jumps.iter().map(findings::clock_jump));
+    let sequences: Vec<ScaleSequence> = derived.scales.iter().map(|(sequence, _)| sequence.clone()).collect();
+    anomalies.extend(sequences.iter().filter_map(findings::scale));
+    anomalies
+        .extend(Axis::ALL.iter().filter_map(|axis| findings::shift(*axis, &derived.shifts[axis.index()], &sequences)));
+    anomalies.extend(derived.measurements.iter().filter_map(findings::outlier));
+    anomalies.extend(saturation::find(archive, windows, &derived.range_corrections));
+    anomalies.sort_by(|a, b| a.from.cmp(&b.from).then(a.kind.cmp(&b.kind)).then(a.axes.cmp(&b.axes)));
+    derived.anomalies = anomalies;
+}
+
+/// The counterparts of Tables 4 to 6 for one axis in range C.
+fn analyse(axis: Axis, derived: &Derived) -> Option<AxisAccuracy> {
+    let calibration = derived.estimated.as_ref()?;
+    let Some(Bias::Fitted(fit)) = &calibration.bias[axis.index()][Range::C.index()] else { return None };
+    let resolution = calibration.resolution_ng[axis.index()][Range::C.index()];
+    let count = fit.residuals.len();
+    let all = (fit.residuals.iter().map(|r| r * r).sum::<f64>() / count as f64).sqrt();
+    let of_law = derived.measurements.iter().filter(|m| m.axis == axis && m.range == Range::C);
+    let sigmas: Vec<f64> = of_law
+        .filter_map(|m| calibration.bias_and_error(axis, Range::C, m.clock_s, m.temperature_c).map(|[_, sigma]| sigma))
+        .collect();
+    let [rms, mean, differences] = calibration.noise?.signal_differences[axis.index()];
+    let statistical_ng = accuracy::statistical_error(fit.residual_rms * resolution, fit.degrees_of_freedom);
+    Some(AxisAccuracy {
+        signal_difference_rms_counts: (differences > 0.0).then_some(rms),
+        signal_difference_mean_counts: mean,
+        signal_differences: differences,
+        bias_fit_rms_counts: all,
+        bias_fit_rms_used_counts: fit.residual_rms,
+        bias_fit_rms_ng: all * resolution,
+        bias_fit_rms_used_ng: fit.residual_rms * resolution,
+        measurements: count,
+        degrees_of_freedom: fit.degrees_of_freedom,
+        statistical_ng,
+        fitted_sigma_ng: sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64 * resolution,
+        total_ng: accuracy::quadrature(&[statistical_ng, calibration.systematic_bias_ng]),
+    })
 }

@@ -1,0 +1,238 @@
+//! The service under load: a whole 14.75-day mission through TCP to queryable products with the store and the recording written;
+//! `/accel` meanwhile; WebSocket fan-out. `cargo bench --bench service` prints a line a figure.
+//!
+//! These are single long runs of everything together, not loops over a function, so the harness is this file's own. The yardstick for
+//! the mission is the same octets through the pure core alone.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use futures_util::StreamExt;
+use oare_ground::config::Config;
+use oare_ground::hub::Body;
+use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader};
+use oare_ground::pipeline::{PlaybackId, Settings, Station};
+use oare_ground::service::Service;
+use oare_ground::simulate::recorder::{Framer, Packetiser, RecorderConfig, playbacks};
+use oare_ground::simulate::{Mission, MissionConfig};
+use serde_json::Value;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+
+/// STS-65: 14.75 days.
+const HOURS: f64 = 354.0;
+/// WebSocket clients of the fan-out.
+const CLIENTS: usize = 50;
+/// Windows told to each of them.
+const FANNED_OUT: usize = 40_000;
+
+fn main() {
+    // `cargo test` runs benches with --test: nothing to check here.
+    if std::env::args().any(|argument| argument == "--test") {
+        return;
+    }
+    let hours = std::env::var("OARE_BENCH_HOURS").ok().and_then(|text| text.parse().ok()).unwrap_or(HOURS);
+    let octets = mission(hours);
+    println!("mission: {hours} h, {:.1} MB", octets.len() as f64 / 1e6);
+    core_alone(&octets);
+    let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build().unwrap();
+    runtime.block_on(async {
+        whole_mission(octets, hours).await;
+        fan_out().await;
+    });
+}
+
+fn mission(hours: f64) -> Vec<u8> {
+    let mission = Mission::new(MissionConfig::sts65(65, hours)).unwrap();
+    let link = LinkConfig::default();
+    let (mut packetiser, mut framer) = (Packetiser::default(), Framer::new(link, 1, 0));
+    let mut frames = Vec::new();
+    for second in mission.fly() {
+        for sent in &second.sent {
+            framer.push(&packetiser.packet(sent), |frame| frames.push(frame));
+        }
+    }
+    framer.finish(|frame| frames.push(frame));
+    playbacks(&frames, &link, &RecorderConfig::clean(), 65).into_iter().flat_map(|pass| pass.octets).collect()
+}
+
+fn core_alone(octets: &[u8]) {
+    let start = Instant::now();
+    let mut station = Station::new(Settings::sts65(), None);
+    let mut reader = PlaybackReader::new(LinkConfig::default());
+    let mut take = |part: PlaybackPart| match part {
+        PlaybackPart::Opened => station.open_playback(PlaybackId(0)),
+        PlaybackPart::Arrival(arrival) => station.take(PlaybackId(0), &arrival),
+        PlaybackPart::Closed { bits } => station.close_playback(PlaybackId(0), bits),
+    };
+    octets.chunks(1 << 16).for_each(|chunk| reader.push(chunk, &mut take));
+    reader.finish(&mut take);
+    station.flush();
+    println!("core alone, one thread: {:.2} s, {} windows", start.elapsed().as_secs_f64(), station.products().count());
+}
+
+fn config(dir: &tempfile::TempDir) -> Config {
+    let mut config = Config::standard();
+    config.ingest.address = SocketAddr::from(([127, 0, 0, 1], 0));
+    config.http.address = SocketAddr::from(([127, 0, 0, 1], 0));
+    config.data_dir = dir.path().to_path_buf();
+    config
+}
+
+/// Resident memory of this process and its peak, MB.
+fn resident_mb() -> (f64, f64) {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let of = |name: &str| {
+        let line = status.lines().find(|line| line.starts_with(name))?;
+        line.split_whitespace().nth(1)?.parse::<f64>().ok()
+    };
+    (of("VmRSS:").unwrap_or(f64::NAN) / 1024.0, of("VmHWM:").unwrap_or(f64::NAN) / 1024.0)
+}
+
+async fn whole_mission(octets: Vec<u8>, hours: f64) {
+    let dir = tempfile::tempdir().unwrap();
+    let service = Service::start(config(&dir)).await.unwrap();
+    let (ingest, http) = (service.ingest_address, service.http_address);
+    let over = Arc::new(AtomicBool::new(false));
+    let asked = tokio::spawn(ask_for_accel(http, over.clone()));
+    let (before_mb, _) = resident_mb();
+    let start = Instant::now();
+    let mut stream = TcpStream::connect(ingest).await.unwrap();
+    stream.write_all(&octets).await.unwrap();
+    stream.shutdown().await.unwrap();
+    let sent_s = start.elapsed().as_secs_f64();
+    let seconds = (hours * 3600.0) as u64;
+    let mut peak_mb = before_mb;
+    let products_s = loop {
+        let picture = service.board.picture();
+        peak_mb = resident_mb().0.max(peak_mb);
+        if picture.seconds_covered >= seconds
+            && picture.playbacks_open == 0
+            && service.hub.windows() as u64 >= seconds / 25
+        {
+            break start.elapsed().as_secs_f64();
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    };
+    over.store(true, Ordering::Relaxed);
+    let mut latencies = asked.await.unwrap();
+    let windows = service.hub.windows();
+    service.drain().await.unwrap();
+    let recorded_s = start.elapsed().as_secs_f64();
+    println!(
+        "mission through TCP to queryable products, store and recording written: products {products_s:.2} s, recording finished \
+         {recorded_s:.2} s (sent in {sent_s:.2} s; {:.0} times real time; {windows} windows)",
+        hours * 3600.0 / products_s
+    );
+    println!("resident memory: {peak_mb:.0} MB at most, of which {before_mb:.0} MB the dump itself and this bench");
+    latencies.sort_by(f64::total_cmp);
+    let at = |share: f64| latencies.get(((latencies.len() as f64 - 1.0) * share) as usize).copied().unwrap_or(f64::NAN);
+    println!(
+        "/accel under that load: p50 {:.3} ms, p99 {:.3} ms, max {:.3} ms ({} requests)",
+        at(0.5),
+        at(0.99),
+        at(1.0),
+        latencies.len()
+    );
+}
+
+/// Asks over one kept-alive connection, a request every 2 ms; latencies in ms.
+async fn ask_for_accel(http: SocketAddr, over: Arc<AtomicBool>) -> Vec<f64> {
+    let mut stream = TcpStream::connect(http).await.unwrap();
+    stream.set_nodelay(true).unwrap();
+    let request = format!("GET /accel HTTP/1.1\r\nhost: {http}\r\n\r\n");
+    let mut buffer = vec![0u8; 1 << 16];
+    let mut latencies = Vec::new();
+    while !over.load(Ordering::Relaxed) {
+        let start = Instant::now();
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let n = stream.read(&mut buffer).await.unwrap();
+        assert!(n > 0, "the service closed the connection");
+        latencies.push(start.elapsed().as_secs_f64() * 1e3);
+        tokio::time::sleep(Duration::from_millis(2)).await;
+    }
+    latencies
+}
+
+async fn fan_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut config = config(&dir);
+    config.recording = false;
+    config.http.live_queue_messages = FANNED_OUT + 1;
+    let service = Service::start(config).await.unwrap();
+    let url = format!("ws://{}/accel/live?topics=window", service.http_address);
+    let received = Arc::new(AtomicU64::new(0));
+    let missed = Arc::new(AtomicU64::new(0));
+    let mut clients = Vec::new();
+    for _ in 0..CLIENTS {
+        let (mut socket, _) = tokio_tungstenite::connect_async(&url).await.unwrap();
+        socket.next().await.unwrap().unwrap();
+        let (received, missed) = (received.clone(), missed.clone());
+        clients.push(tokio::spawn(async move {
+            let mut had = 0;
+            while had < FANNED_OUT as u64 {
+                let message = socket.next().await.unwrap().unwrap();
+                let text = message.into_text().unwrap();
+                if text.contains("\"type\":\"lag\"") {
+                    let lag: Value = serde_json::from_str(&text).unwrap();
+                    let count = lag["count"].as_u64().unwrap();
+                    missed.fetch_add(count, Ordering::Relaxed);
+                    had += count;
+                } else {
+                    received.fetch_add(1, Ordering::Relaxed);
+                    had += 1;
+                }
+            }
+        }));
+    }
+    let bodies = windows();
+    let start = Instant::now();
+    let hub = service.hub.clone();
+    tokio::task::spawn_blocking(move || {
+        for some in bodies.chunks(500) {
+            hub.publish(some.to_vec());
+        }
+    })
+    .await
+    .unwrap();
+    for client in clients {
+        client.await.unwrap();
+    }
+    let elapsed_s = start.elapsed().as_secs_f64();
+    let delivered = received.load(Ordering::Relaxed);
+    let all = (CLIENTS * FANNED_OUT) as u64;
+    println!(
+        "WebSocket fan-out: {:.0} deliveries/s ({CLIENTS} clients in the same process, {delivered} delivered, {} told missed, {} unreported)",
+        delivered as f64 / elapsed_s,
+        missed.load(Ordering::Relaxed),
+        all - delivered - missed.load(Ordering::Relaxed)
+    );
+    service.drain().await.unwrap();
+}
+
+/// Windows of a short mission, told again and again under other starts.
+fn windows() -> Vec<Body> {
+    let mut station = Station::new(Settings::sts65(), None);
+    station.open_playback(PlaybackId(0));
+    let mut reader = PlaybackReader::new(LinkConfig::default());
+    let octets = mission(6.0);
+    let mut take = |part: PlaybackPart| {
+        if let PlaybackPart::Arrival(arrival) = part {
+            station.take(PlaybackId(0), &arrival);
+        }
+    };
+    reader.push(&octets, &mut take);
+    reader.finish(&mut take);
+    station.flush();
+    let products: Vec<_> = station.products().copied().collect();
+    let again = products.iter().cycle().take(FANNED_OUT).zip(0i64..);
+    again
+        .map(|(product, n)| {
+            let mut product = *product;
+            product.start = oare_ground::units::Clock::from_tenths(n * 250);
+            Body::Window(product)
+        })
+        .collect()
+}

@@ -1,0 +1,89 @@
+//! `oare challenge --real`: the lot over real recordings, and the evidence it leaves.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use anyhow::Context;
+use indicatif::ProgressBar;
+use oare_ground::challenge::real::evidence::{Evidence, LIMITS, Whole};
+use oare_ground::challenge::real::{self, NOTHING, Outcome, Real, Score};
+use oare_ground::diagnose::measured::{self, Kind};
+
+use super::challenge::bar;
+
+/// Draw, analyse, reveal, score; with `out`, diagnose the cases whole and write the evidence.
+pub fn run(dir: &Path, draws: usize, seed: u64, out: Option<&Path>) -> anyhow::Result<ExitCode> {
+    let folders = real::folders(dir);
+    if folders.is_empty() {
+        eprintln!("SKIPPED: no real recordings below {}", dir.display());
+        return Ok(super::DONE);
+    }
+    let progress = bar(folders.len(), "full models");
+    let read = Real::read(dir, &|| progress.inc(1))?;
+    progress.finish_and_clear();
+    let lots = read.draw(draws, seed);
+    let commitment = real::commitment(&lots);
+    eprintln!(
+        "{} draws over {} satellites, pose sets and axes; commitment {commitment}",
+        lots.len(),
+        read.subjects.len()
+    );
+    let progress = bar(lots.len(), "analysing");
+    let outcomes = read.run(&lots, &|| progress.inc(1));
+    progress.finish_and_clear();
+    let score = real::score(&outcomes, commitment);
+    show(&outcomes, &score);
+    if let Some(out) = out {
+        write(out, &folders, outcomes, score)?;
+    }
+    Ok(super::DONE)
+}
+
+fn show(outcomes: &[Outcome], score: &Score) {
+    for wrong in outcomes.iter().filter(|o| !o.right) {
+        let named = if wrong.named.is_empty() { NOTHING.to_owned() } else { wrong.named.join(", ") };
+        println!("draw {}: {} without {}: named {named}", wrong.truth.draw, wrong.truth.subject, wrong.truth.removed);
+    }
+    let line = |what: &str, [good, of]: [usize; 2]| {
+        println!("{what:<52} {good:>5} of {of:>5}   {:.1} %", 100.0 * good as f64 / of.max(1) as f64);
+    };
+    line("a term taken out, named rightly and alone", score.removed);
+    line("nothing taken out, answered with nothing", score.nothing);
+    line("coefficients within 2 sigma of the full model's", score.coefficients);
+    println!("{LIMITS}");
+}
+
+fn write(out: &Path, folders: &[std::path::PathBuf], draws: Vec<Outcome>, score: Score) -> anyhow::Result<()> {
+    std::fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
+    let progress: ProgressBar = bar(folders.len() + 1, "whole cases");
+    let mut cases = Vec::new();
+    for folder in folders {
+        for with in variants(folder)? {
+            let (case, files) = real::read(folder, &with)?;
+            let answer = measured::diagnose(&case, &files).with_context(|| folder.display().to_string())?;
+            let with = if with.is_empty() { "as it stands".to_owned() } else { with.join(", ") };
+            cases.push(Whole { with, answer });
+            progress.inc(1);
+        }
+    }
+    progress.finish_and_clear();
+    let evidence = Evidence { limits: LIMITS, score, draws, cases };
+    let file = |name: &str, text: String| {
+        let path = out.join(name);
+        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+    };
+    file("evidence.json", serde_json::to_string_pretty(&evidence)?)?;
+    file("evidence.html", evidence.html())?;
+    eprintln!("evidence in {}", out.display());
+    Ok(())
+}
+
+/// As it stands; an orbit once more with its second half held back.
+fn variants(folder: &Path) -> anyhow::Result<Vec<Vec<String>>> {
+    let (case, _) = real::read(folder, &[])?;
+    let half = case.number("recording.fit_hours")?.map(|h| format!("recording.fit_hours={}", h / 2.0));
+    match (case.kind, half) {
+        (Kind::OrbitSp3, Some(half)) => Ok(vec![Vec::new(), vec![half]]),
+        _ => Ok(vec![Vec::new()]),
+    }
+}

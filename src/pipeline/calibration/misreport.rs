@@ -1,0 +1,259 @@
+//! Spans in which the records name a range the sensor is not in.
+//!
+//! Ranges differ by factors of ten and more in what a count means, so scatter and level of a window in counts tell which one
+//! it was taken in: the scatter must be that of the mission, the level within a few micro-g of the bias of the range. Both are
+//! weighed for the range reported against every other, window by window for the span, second by second for its ends.
+
+use std::collections::BTreeMap;
+
+use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
+use super::apply::Calibration;
+use crate::math::robust::median;
+use crate::pipeline::archive::{Archive, RECORD_TENTHS};
+use crate::pipeline::window::Window;
+use crate::telemetry::{AccRecord, Axis, Mode, Range};
+use crate::units::Clock;
+
+/// Scatter of windows varies by about this factor (natural logarithm) with crew and bursts.
+const LN_SCATTER_WIDTH: f64 = 1.0;
+/// Quasi-steady accelerations are within this, ng: drag, gravity gradient, rotation.
+const LEVEL_NG: f64 = 1500.0;
+/// A window speaks for another range when its weight of evidence (natural logarithm) is above this.
+const EVIDENCE_MIN: f64 = 20.0;
+/// Windows that make a span.
+const WINDOWS_MIN: usize = 3;
+/// Windows without a say that do not end a span.
+const CELLS_BETWEEN_MAX: i64 = 8;
+/// Seconds around the ends of the span of windows in which its true ends are looked for.
+const SEARCH_TENTHS: i64 = 900;
+/// What one second can say at most: a burst must not move an end.
+const SECOND_EVIDENCE_MAX: f64 = 15.0;
+/// Smallest scatter told apart, counts.
+const SCATTER_COUNTS_MIN: f64 = 0.3;
+
+/// What is usual: scatter of each axis, ng, and where the biases lie.
+struct Usual<'a> {
+    scatter_ng: [f64; 3],
+    calibration: &'a Calibration,
+}
+
+/// Level and scatter of one axis over some time, counts.
+struct Seen {
+    axis: Axis,
+    level: f64,
+    scatter: f64,
+    clock_s: f64,
+    temperature_c: f64,
+}
+
+impl Usual<'_> {
+    /// Log likelihood (without what is common) of what was seen if the range were this.
+    fn favour(&self, seen: &Seen, range: Range, level_ng: f64) -> Option<f64> {
+        let (i, j) = (seen.axis.index(), range.index());
+        let resolution = self.calibration.resolution_ng[i][j];
+        let bias = self.calibration.bias_at(seen.axis, range, seen.clock_s, seen.temperature_c)?;
+        let usual = (self.scatter_ng[i] / resolution).max(SCATTER_COUNTS_MIN);
+        let scatter = (seen.scatter.max(SCATTER_COUNTS_MIN) / usual).ln() / LN_SCATTER_WIDTH;
+        let width = (level_ng / resolution).hypot(1.0);
+        let level = (seen.level - bias) / width;
+        Some(-0.5 * (scatter * scatter + (level * level).min(400.0)))
+    }
+}
+
+fn usual_scatter_ng(windows: &BTreeMap<i64, Window>, resolution_ng: &[[f64; 3]; 3]) -> Option<[f64; 3]> {
+    let mut usual = [0.0; 3];
+    for axis in 0..3 {
+        let mut all: Vec<f64> = windows
+            .values()
+            .filter(|w| w.mode == Mode::Normal)
+            .filter_map(|w| w.axes[axis].map(|a| a.estimate.winsorised_sd * resolution_ng[axis][a.range.index()]))
+            .collect();
+        usual[axis] = median(&mut all)?;
+    }
+    Some(usual)
+}
+
+/// One window's evidence for a range: per axis, log likelihood over that of the range reported.
+fn evidence(usual: &Usual<'_>, window: &Window, actual: Range) -> Option<[f64; 3]> {
+    let mut of_axes = [0.0; 3];
+    for axis in Axis::ALL {
+        let seen = window.axes[axis.index()]?;
+        if seen.range == actual {
+            continue;
+        }
+        let seen_as = Seen {
+            axis,
+            level: seen.estimate.mean,
+            scatter: seen.estimate.winsorised_sd,
+            clock_s: window.centre_s(),
+            temperature_c: window.temperature_c,
+        };
+        of_axes[axis.index()] =
+            usual.favour(&seen_as, actual, LEVEL_NG)? - usual.favour(&seen_as, seen.range, LEVEL_NG)?;
+    }
+    Some(of_axes)
+}
+
+/// A run of windows that speak for another range.
+struct Span {
+    cells: [i64; 2],
+    actual: Range,
+    windows: usize,
+    of_axes: [f64; 3],
+    ln_ratio: Vec<f64>,
+}
+
+/// Finds the spans, their corrections and what to tell.
+pub fn find(
+    archive: &Archive,
+    windows: &BTreeMap<i64, Window>,
+    calibration: &Calibration,
+) -> Vec<(Anomaly, Vec<RangeCorrection>)> {
+    let Some(scatter_ng) = usual_scatter_ng(windows, &calibration.resolution_ng) else { return Vec::new() };
+    let usual = Usual { scatter_ng, calibration };
+    let mut spans: Vec<Span> = Vec::new();
+    for (cell, window) in windows.iter().filter(|(_, w)| w.mode == Mode::Normal) {
+        let best = Range::ALL
+            .into_iter()
+            .filter_map(|range| evidence(&usual, window, range).map(|of_axes| (range, of_axes)))
+            .max_by(|a, b| a.1.iter().sum::<f64>().total_cmp(&b.1.iter().sum::<f64>()));
+        let Some((actual, of_axes)) = best.filter(|(_, of_axes)| of_axes.iter().sum::<f64>() > EVIDENCE_MIN) else {
+            continue;
+        };
+        let ln_ratio = ln_scatter_ratio(&usual, window);
+        match spans.last_mut() {
+            Some(span) if span.actual == actual && cell - span.cells[1] <= CELLS_BETWEEN_MAX => {
+                span.cells[1] = *cell;
+                span.windows += 1;
+                span.ln_ratio.push(ln_ratio);
+                span.of_axes.iter_mut().zip(of_axes).for_each(|(sum, one)| *sum += one);
+            }
+            _ => spans.push(Span { cells: [*cell, *cell], actual, windows: 1, of_axes, ln_ratio: vec![ln_ratio] }),
+        }
+    }
+    spans
+        .iter()
+        .filter(|span| span.windows >= WINDOWS_MIN)
+        .filter_map(|span| settle_span(archive, &usual, windows, span))
+        .collect()
+}
+
+fn ln_scatter_ratio(usual: &Usual<'_>, window: &Window) -> f64 {
+    let ratios: Vec<f64> = (0..3)
+        .filter_map(|axis| {
+            let seen = window.axes[axis]?;
+            let resolution = usual.calibration.resolution_ng[axis][seen.range.index()];
+            Some((seen.estimate.winsorised_sd.max(SCATTER_COUNTS_MIN) * resolution / usual.scatter_ng[axis]).ln())
+        })
+        .collect();
+    ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+}
+
+/// The ends of a span to the second, the axes concerned, and the sentence.
+fn settle_span(
+    archive: &Archive,
+    usual: &Usual<'_>,
+    windows: &BTreeMap<i64, Window>,
+    span: &Span,
+) -> Option<(Anomaly, Vec<RangeCorrection>)> {
+    let inside = windows.get(&((span.cells[0] + span.cells[1]) / 2)).or_else(|| windows.get(&span.cells[0]))?;
+    let reported: Vec<(Axis, Range)> = Axis::ALL
+        .into_iter()
+        .filter_map(|axis| inside.axes[axis.index()].map(|a| (axis, a.range)))
+        .filter(|(axis, range)| *range != span.actual && span.of_axes[axis.index()] > 0.0)
+        .collect();
+    let (_, reported_range) = *reported.first()?;
+    let first = Clock::from_tenths(span.cells[0] * 250);
+    let last = Clock::from_tenths((span.cells[1] + 2) * 250);
+    let from = end_near(archive, usual, &reported, span.actual, first, true)?;
+    let to = end_near(archive, usual, &reported, span.actual, last, false)?;
+    let corrections = reported
+        .iter()
+        .map(|(axis, range)| RangeCorrection { from, to, axis: *axis, reported: *range, actual: span.actual })
+        .collect();
+    let count = span.ln_ratio.len() as f64;
+    let mean = span.ln_ratio.iter().sum::<f64>() / count;
+    let spread = (span.ln_ratio.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count).sqrt();
+    let value = (-mean).exp();
+    let axes: Vec<Axis> = reported.iter().map(|(axis, _)| *axis).collect();
+    let letters: Vec<String> = axes.iter().map(|axis| axis.letter().to_uppercase()).collect();
+    let hours = (to.tenths() - from.tenths()) as f64 / 36_000.0;
+    let sentence = format!(
+        "For {hours:.2} h the records say range {} in {} while the sensor was in range {}: the samples scatter {value:.3} times \
+         less than they would; the windows are calibrated in range {} and flagged range_corrected.",
+        reported_range.letter(),
+        letters.join(", "),
+        span.actual.letter(),
+        span.actual.letter(),
+    );
+    let anomaly = Anomaly {
+        kind: AnomalyKind::RangeMisreport,
+        from,
+        to,
+        axes,
+        value,
+        sigma: value * spread / count.sqrt(),
+        unit: "ratio",
+        sentence,
+    };
+    Some((anomaly, corrections))
+}
+
+/// What one second says for the actual range against the one reported.
+fn second_evidence(usual: &Usual<'_>, record: &AccRecord, reported: &[(Axis, Range)], actual: Range) -> f64 {
+    let mut total = 0.0;
+    for (axis, range) in reported {
+        let counts: Vec<f64> = record.counts.iter().map(|s| f64::from(s[axis.index()])).collect();
+        if record.counts.iter().any(|s| AccRecord::is_at_rail(s[axis.index()])) {
+            continue;
+        }
+        let level = counts.iter().sum::<f64>() / 10.0;
+        // Ten correlated samples scatter by about 0.6 of what a window's do.
+        let scatter = (counts.iter().map(|c| (c - level).powi(2)).sum::<f64>() / 9.0).sqrt() / 0.6;
+        let temperature_c = f64::from(record.temperature_c);
+        let seen = Seen { axis: *axis, level, scatter, clock_s: record.clock.seconds(), temperature_c };
+        let level_ng = LEVEL_NG.hypot(2.0 * usual.scatter_ng[axis.index()]);
+        if let (Some(a), Some(r)) = (usual.favour(&seen, actual, level_ng), usual.favour(&seen, *range, level_ng)) {
+            total += a - r;
+        }
+    }
+    total.clamp(-SECOND_EVIDENCE_MAX, SECOND_EVIDENCE_MAX)
+}
+
+/// The end of the span nearest to `near`: the split of the seconds around it that their evidence favours most.
+fn end_near(
+    archive: &Archive,
+    usual: &Usual<'_>,
+    reported: &[(Axis, Range)],
+    actual: Range,
+    near: Clock,
+    is_start: bool,
+) -> Option<Clock> {
+    let (from, to) = (near.plus_tenths(-SEARCH_TENTHS), near.plus_tenths(SEARCH_TENTHS));
+    let seconds: Vec<(Clock, f64)> = archive
+        .records_between(from, to)
+        .map(|record| {
+            let concerned = record.mode == Mode::Normal
+                && reported.iter().all(|(axis, range)| record.ranges[axis.index()] == *range);
+            let says = if concerned { second_evidence(usual, record, reported, actual) } else { -SECOND_EVIDENCE_MAX };
+            (record.clock, says)
+        })
+        .collect();
+    let total: f64 = seconds.iter().map(|(_, says)| says).sum();
+    let mut before = 0.0;
+    let (mut best, mut best_clock) = (f64::NEG_INFINITY, None);
+    for place in 0..=seconds.len() {
+        let favour = if is_start { total - 2.0 * before } else { 2.0 * before - total };
+        if favour > best {
+            best = favour;
+            best_clock = match place {
+                n if n < seconds.len() => Some(seconds[n].0),
+                _ => seconds.last().map(|(clock, _)| clock.plus_tenths(RECORD_TENTHS)),
+            };
+        }
+        if let Some((_, says)) = seconds.get(place) {
+            before += says;
+        }
+    }
+    best_clock
+}

@@ -1,0 +1,123 @@
+//! Channels at the rail, beyond what autoranging explains.
+//!
+//! A jet or a bump drives range C to its rail for a moment, and within 5 s the instrument takes a coarser range: that is how
+//! it is meant to work, and the samples are flagged anyway. It is told as a saturation when it lasts for a second and is none of
+//! that: it outlasts autoranging, or happens in range A, or comes faster than the 1 Hz filter lets an overload rise.
+
+use std::collections::BTreeMap;
+
+use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
+use crate::pipeline::archive::Archive;
+use crate::pipeline::window::Window;
+use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range};
+use crate::units::Clock;
+
+/// Shorter ones are not told, samples: a second.
+const SAMPLES_MIN: usize = 10;
+/// Autoranging reacts within this, tenths of a second.
+const AUTORANGE_TENTHS: i64 = 50;
+/// A step to the rail larger than this between two samples is not the filter's output of an ordinary overload, counts.
+const STEP_COUNTS: i32 = 16_384;
+/// Runs closer than this are one, tenths of a second.
+const APART_TENTHS: i64 = 50;
+/// Y at the rail for this long in reentry mode is the shutdown, s.
+const SHUTDOWN_S: f64 = 60.0;
+
+/// One axis at the rail.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    axis: Axis,
+    from: Clock,
+    to: Clock,
+    samples: usize,
+    abrupt: bool,
+    range: Range,
+    mode: Mode,
+}
+
+/// The saturations, in order of time.
+pub fn find(archive: &Archive, windows: &BTreeMap<i64, Window>, corrections: &[RangeCorrection]) -> Vec<Anomaly> {
+    let mut cells: Vec<i64> = windows
+        .iter()
+        .filter(|(_, w)| w.quality.contains(Quality::SATURATED) || w.mode == Mode::Reentry)
+        .flat_map(|(cell, _)| [*cell, *cell + 1])
+        .collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let mut runs: Vec<Run> = Vec::new();
+    let mut last: [Option<(Clock, i16)>; 3] = [None; 3];
+    for record in cells.into_iter().flat_map(|cell| archive.cell(cell)) {
+        if !matches!(record.mode, Mode::Normal | Mode::Reentry) {
+            continue;
+        }
+        for axis in Axis::ALL {
+            add(&mut runs, record, axis, &mut last[axis.index()]);
+        }
+    }
+    let mut found: Vec<Anomaly> = runs.iter().filter(|run| is_told(run, corrections)).map(tell).collect();
+    found.sort_by(|a, b| a.from.cmp(&b.from).then(a.axes.cmp(&b.axes)));
+    found
+}
+
+fn add(runs: &mut Vec<Run>, record: &AccRecord, axis: Axis, last: &mut Option<(Clock, i16)>) {
+    for (n, sample) in record.counts.iter().enumerate() {
+        let count = sample[axis.index()];
+        let clock = record.clock.plus_tenths(n as i64);
+        if AccRecord::is_at_rail(count) {
+            let step = last
+                .filter(|(before, _)| clock.tenths() - before.tenths() == 1)
+                .map_or(0, |(_, before)| (i32::from(count) - i32::from(before)).abs());
+            let open = runs.iter_mut().rev().find(|run| run.axis == axis);
+            match open {
+                Some(run) if clock.tenths() - run.to.tenths() < APART_TENTHS && run.mode == record.mode => {
+                    run.to = clock.plus_tenths(1);
+                    run.samples += 1;
+                }
+                _ => runs.push(Run {
+                    axis,
+                    from: clock,
+                    to: clock.plus_tenths(1),
+                    samples: 1,
+                    abrupt: step > STEP_COUNTS,
+                    range: record.ranges[axis.index()],
+                    mode: record.mode,
+                }),
+            }
+        }
+        *last = Some((clock, count));
+    }
+}
+
+fn is_told(run: &Run, corrections: &[RangeCorrection]) -> bool {
+    let corrected = corrections
+        .iter()
+        .find(|c| c.axis == run.axis && c.from.plus_tenths(-50) <= run.from && run.from < c.to.plus_tenths(50))
+        .map_or(run.range, |c| c.actual);
+    let outlasts = run.to.tenths() - run.from.tenths() > AUTORANGE_TENTHS && run.samples as i64 > AUTORANGE_TENTHS;
+    run.samples >= SAMPLES_MIN && (outlasts || run.abrupt || corrected == Range::A)
+}
+
+fn tell(run: &Run) -> Anomaly {
+    let value = run.samples as f64 / 10.0;
+    let letter = run.axis.letter().to_uppercase();
+    let sentence = match run.mode {
+        Mode::Reentry if value >= SHUTDOWN_S => format!(
+            "{letter} was at the rail for {value:.1} s in reentry mode: the instrument shut down on its re-capture limit, its \
+             normal end."
+        ),
+        _ => format!(
+            "{letter} was at the rail for {value:.1} s in range {}: these samples enter no estimate.",
+            run.range.letter()
+        ),
+    };
+    Anomaly {
+        kind: AnomalyKind::Saturation,
+        from: run.from,
+        to: run.to,
+        axes: vec![run.axis],
+        value,
+        sigma: 0.1,
+        unit: "s",
+        sentence,
+    }
+}
