@@ -96,7 +96,7 @@ pub fn draw(kind: Kind, seed: u64) -> Concealed {
 }
 
 /// Flights tried until the drawn effect has a fair size on one.
-const ATTEMPTS: u64 = 24;
+const ATTEMPTS: u64 = 12;
 /// Least SNR of a question that is asked.
 const SNR_MIN: f64 = 5.0;
 /// An unlisted law keeps at least this SNR against the nearest effect of the catalogue.

@@ -292,7 +292,7 @@ pub fn ladder(plates: &Plates) -> Drawn {
     let (low, high) = range(shown.iter().map(|(_, e)| *e).chain([0.0]));
     let pad = 0.06 * (high - low);
     let rows = shown.len();
-    on_canvas(60 + 26 * rows as u32, |canvas| {
+    on_canvas(44 + 26 * rows as u32, |canvas| {
         let mut chart = ChartBuilder::on(canvas)
             .margin_right(70)
             .margin_top(4)

@@ -100,10 +100,6 @@ fn the_page_of_a_finding_holds_its_numbers_and_all_figures() {
     }
     assert_eq!(report.html.matches("<svg").count(), 5);
     assert!(!report.html.contains("NaN") && !report.html.contains("<script") && !report.html.contains("src="));
-    if let Ok(directory) = std::env::var("OARE_REPORT_SAMPLE") {
-        std::fs::create_dir_all(&directory).unwrap();
-        std::fs::write(format!("{directory}/index.html"), &report.html).unwrap();
-    }
 }
 
 #[test]
