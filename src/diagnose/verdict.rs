@@ -43,7 +43,7 @@ fn ids(library: &Library, set: &Set) -> Vec<String> {
         .collect()
 }
 
-fn effect_of<'a>(entries: &'a [Entry], set: &Set, i: usize) -> Option<&'static Effect> {
+fn effect_of(entries: &[Entry], set: &Set, i: usize) -> Option<&'static Effect> {
     match entries[set.members[i].entry].family {
         Family::Listed(effect) => Some(effect),
         Family::Open(_) => None,

@@ -268,7 +268,7 @@ mod tests {
             })
             .collect();
         let zero = State { r: Vector3::zeros(), v: Vector3::zeros() };
-        let column = gauss.step_linear(900.0, zero, &gradient, &vec![push; 6]);
+        let column = gauss.step_linear(900.0, zero, &gradient, &[push; 6]);
         assert!((column.r - (two.end.r - one.end.r)).norm() < 1e-6 * column.r.norm());
     }
 }

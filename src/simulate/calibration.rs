@@ -112,7 +112,7 @@ impl Schedule {
         let mut id = plan.first_id;
         while at_s + BIAS_S <= end_s {
             schedule.add_bias(at_s, id);
-            let scale_due = plan.scale_every > 0 && (id + plan.scale_every - 1) % plan.scale_every == 0;
+            let scale_due = plan.scale_every > 0 && (id + plan.scale_every - 1).is_multiple_of(plan.scale_every);
             if scale_due {
                 schedule.add_scale(plan, at_s + BIAS_S, end_s, id, abort_of(faults, id));
             }

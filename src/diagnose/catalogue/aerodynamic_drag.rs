@@ -15,7 +15,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual points against the velocity in every attitude and scales with the modelled drag.",
 };
 

@@ -16,7 +16,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual has the cross-track part that a turning atmosphere gives, changing sign between ascending and descending passes, with a small loss of drag along the track.",
 };
 

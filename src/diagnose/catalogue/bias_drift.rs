@@ -14,9 +14,9 @@ pub const EFFECT: Effect = Effect {
     linear: &push(150.0, 20000.0),
     nonlinear: &[Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.2, range: [7.6, 13.5] }],
     log_prior: COMMON,
-    grid: grid,
-    log_volume: log_volume,
-    signature: signature,
+    grid,
+    log_volume,
+    signature,
     why: "The bias of each sensor axis relaxes from the beginning of the record with one time constant, whatever the attitude does.",
 };
 

@@ -20,9 +20,9 @@ pub const EFFECT: Effect = Effect {
         range: [f64::NEG_INFINITY, f64::INFINITY],
     }],
     log_prior: COMMON,
-    grid: grid,
-    log_volume: log_volume,
-    signature: signature,
+    grid,
+    log_volume,
+    signature,
     why: "Each sensor axis jumps once, at one instant, and stays there whatever the attitude does.",
 };
 

@@ -21,7 +21,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual is linear in the gravity-gradient and rotation tensor: it changes with every attitude as a displaced sensor must, and a bias cannot.",
 };
 

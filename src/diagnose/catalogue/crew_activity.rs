@@ -15,7 +15,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual shifts at the logged ends of the sleep periods and nowhere else.",
 };
 

@@ -16,7 +16,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual lies along the drag, once per orbit, strongest when the vehicle passes the afternoon side: it follows the Sun and not the perigee.",
 };
 

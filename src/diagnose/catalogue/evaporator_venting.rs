@@ -15,7 +15,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual is a push fixed in the body that begins and ends with the logged cycles of the evaporator.",
 };
 

@@ -17,7 +17,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual is the gravity gradient at the assumed sensor position: it turns with the local vertical in body axes and follows every attitude change.",
 };
 

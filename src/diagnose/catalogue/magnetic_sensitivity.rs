@@ -26,7 +26,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual is linear in the geomagnetic field in body axes: it follows magnetic latitude, with the Earth turning below the orbit.",
 };
 

@@ -27,9 +27,9 @@ pub const EFFECT: Effect = Effect {
         range: [f64::NEG_INFINITY, f64::INFINITY],
     }],
     log_prior: COMMON,
-    grid: grid,
-    log_volume: log_volume,
-    signature: signature,
+    grid,
+    log_volume,
+    signature,
     why: "The residual begins at a logged change of mass and follows the gravity-gradient and rotation tensor from there on: the centre of gravity moved.",
 };
 

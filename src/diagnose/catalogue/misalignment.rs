@@ -20,7 +20,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "What one axis should read leaks into the others with fixed small angles, in every attitude.",
 };
 

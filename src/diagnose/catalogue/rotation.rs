@@ -17,7 +17,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual follows the square of the body rates and their change at the assumed sensor position, largest in manoeuvres.",
 };
 

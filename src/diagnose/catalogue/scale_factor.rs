@@ -13,9 +13,9 @@ pub const EFFECT: Effect = Effect {
     linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 1.5 }],
     nonlinear: &[Nonlinear { name: "axis", unit: "", log: false, step: 0.0, range: [0.0, 2.0] }],
     log_prior: COMMON,
-    grid: grid,
-    log_volume: log_volume,
-    signature: signature,
+    grid,
+    log_volume,
+    signature,
     why: "All the modelled physics of one axis is off by the same factor, gravity gradient and drag alike, and the other axes are not.",
 };
 

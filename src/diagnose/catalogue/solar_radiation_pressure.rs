@@ -17,7 +17,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual points away from the Sun and switches at the edges of the shadow, without lag.",
 };
 

@@ -18,9 +18,9 @@ pub const EFFECT: Effect = Effect {
     ],
     nonlinear: &[Nonlinear { name: "lag_s", unit: "s", log: false, step: 200.0, range: [0.0, 28_800.0] }],
     log_prior: COMMON,
-    grid: grid,
-    log_volume: log_volume,
-    signature: signature,
+    grid,
+    log_volume,
+    signature,
     why: "The residual is proportional to the sensor temperature on every axis, swings with the daily and orbital cycle and lags as stated.",
 };
 

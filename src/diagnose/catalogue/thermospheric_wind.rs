@@ -19,7 +19,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: RARE,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual is what a steady wind along and across the track does to the drag, of a speed that the thermosphere has.",
 };
 

@@ -15,7 +15,7 @@ pub const EFFECT: Effect = Effect {
     log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
-    signature: signature,
+    signature,
     why: "The residual is a push fixed in the body that is there only while logged firings last.",
 };
 

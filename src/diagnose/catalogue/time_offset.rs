@@ -14,9 +14,9 @@ pub const EFFECT: Effect = Effect {
     linear: &[],
     nonlinear: &[Nonlinear { name: "offset_s", unit: "s", log: false, step: 3.0, range: [-600.0, 600.0] }],
     log_prior: COMMON,
-    grid: grid,
-    log_volume: log_volume,
-    signature: signature,
+    grid,
+    log_volume,
+    signature,
     why: "The recording shows the modelled signal late or early: the difference follows its time derivative, manoeuvres above all.",
 };
 

@@ -17,9 +17,9 @@ pub const EFFECT: Effect = Effect {
         Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, range: [5.7, 11.5] },
     ],
     log_prior: COMMON,
-    grid: grid,
-    log_volume: log_volume,
-    signature: signature,
+    grid,
+    log_volume,
+    signature,
     why: "A push fixed in the body begins at an instant no log names and dies away exponentially, whatever the attitude does.",
 };
 

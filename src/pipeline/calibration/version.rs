@@ -94,7 +94,7 @@ fn transients(pairs: &[&Pair<'_, '_>], settings: &Settings) -> Option<[Transient
     found.iter().any(Transient::is_real).then_some(found)
 }
 
-fn transient_of<'t>(settling: Option<&'t [Transient; 2]>, axis: Axis) -> Option<&'t Transient> {
+fn transient_of(settling: Option<&[Transient; 2]>, axis: Axis) -> Option<&Transient> {
     settling.and_then(|both| match axis {
         Axis::X => None,
         Axis::Y => Some(&both[0]),
