@@ -41,7 +41,7 @@ impl AccRecord {
 
     /// Whether this count is at either rail.
     pub const fn is_at_rail(count: i16) -> bool {
-        count >= Self::RAIL_COUNTS || count <= -Self::RAIL_COUNTS
+        count.unsigned_abs() >= Self::RAIL_COUNTS.unsigned_abs()
     }
 }
 

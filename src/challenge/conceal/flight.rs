@@ -276,9 +276,12 @@ fn attitude(
     let half_width: f64 =
         if freedom.single_attitude { log_between(rng, 0.02, 0.1) } else { log_between(rng, 0.12, 0.8) }.to_radians();
     let wave: Vec<(f64, f64, f64)> = (0..3)
-        .map(|_| (half_width * between(rng, 0.5, 1.0), between(rng, 700.0, 1700.0), between(rng, 0.0, std::f64::consts::TAU)))
+        .map(|_| {
+            (half_width * between(rng, 0.5, 1.0), between(rng, 700.0, 1700.0), between(rng, 0.0, std::f64::consts::TAU))
+        })
         .collect();
-    let drift: Vec<(f64, f64)> = (0..3).map(|_| (between(rng, 5e3, 2e4), between(rng, 0.0, std::f64::consts::TAU))).collect();
+    let drift: Vec<(f64, f64)> =
+        (0..3).map(|_| (between(rng, 5e3, 2e4), between(rng, 0.0, std::f64::consts::TAU))).collect();
     let slew_s = between(rng, 1000.0, 1700.0);
     let frozen = lvlh(&r[0], &v[0]);
     let target = |hold: &Attitude, k: usize| {
@@ -351,7 +354,8 @@ fn density(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>], freedom: 
     let (scale_m, structure) =
         if freedom.other_physics { (between(rng, 40e3, 55e3), between(rng, 0.02, 0.08)) } else { (45e3, 0.0) };
     let lat = between(rng, -0.1, 0.1) * if freedom.other_physics { 1.0 } else { 0.0 };
-    let waves: Vec<(f64, f64)> = (0..4).map(|_| (log_between(rng, 900.0, 40e3), between(rng, 0.0, std::f64::consts::TAU))).collect();
+    let waves: Vec<(f64, f64)> =
+        (0..4).map(|_| (log_between(rng, 900.0, 40e3), between(rng, 0.0, std::f64::consts::TAU))).collect();
     let density = r
         .iter()
         .zip(times_s)
@@ -370,8 +374,9 @@ fn density(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>], freedom: 
 fn temperature(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>]) -> Vec<f64> {
     let (day_c, orbit_c) = (between(rng, 0.4, 1.3), between(rng, 0.1, 0.35));
     let (day_phase, orbit_phase) = (between(rng, 0.0, std::f64::consts::TAU), between(rng, 0.0, std::f64::consts::TAU));
-    let wander: Vec<(f64, f64, f64)> =
-        (0..3).map(|_| (between(rng, 0.05, 0.3), between(rng, 15e3, 2e5), between(rng, 0.0, std::f64::consts::TAU))).collect();
+    let wander: Vec<(f64, f64, f64)> = (0..3)
+        .map(|_| (between(rng, 0.05, 0.3), between(rng, 15e3, 2e5), between(rng, 0.0, std::f64::consts::TAU)))
+        .collect();
     let orbit_s = std::f64::consts::TAU * (r[0].norm().powi(3) / MU_M3_S2).sqrt();
     let mean_c = between(rng, 3.0, 5.0);
     times_s
