@@ -187,7 +187,7 @@ impl Program {
 
 /// Kills the service at so many instants of a playback at full speed; whatever it had counted must be there, and in the end the products
 /// are those of an undisturbed run.
-async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, seed: u64) {
+async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, within_s: f64, seed: u64) {
     let dir = tempfile::tempdir().unwrap();
     let mut state = seed;
     let mut random = move || {
@@ -205,7 +205,7 @@ async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, seed: u64) {
             }
         });
         // Some kills fall into the middle of a commit: the instants are spread over the time that a playback takes.
-        let until = Instant::now() + Duration::from_secs_f64(random() * 0.6);
+        let until = Instant::now() + Duration::from_secs_f64(random() * within_s);
         let mut counted = 0;
         while Instant::now() < until {
             if let Some(status) = program.status().await {
@@ -237,7 +237,7 @@ async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, seed: u64) {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_killed_service_has_everything_it_counted() {
     let dumps: Vec<Vec<u8>> = (0..2).map(|n| dump(20_000 + n * 9_000, 9_000, n as u32 * 10_000)).collect();
-    kill_and_restart(&dumps, 4, 7).await;
+    kill_and_restart(&dumps, 4, 0.6, 7).await;
 }
 
 #[cfg(feature = "slow")]
@@ -259,5 +259,5 @@ async fn fifty_kills_in_a_mission_lose_nothing() {
     framer.finish(|frame| frames.push(frame));
     let passes = playbacks(&frames, &link, &RecorderConfig::messy(), 65);
     let octets: Vec<u8> = passes.into_iter().flat_map(|pass| pass.octets).collect();
-    kill_and_restart(&[octets], 50, 65).await;
+    kill_and_restart(&[octets], 50, 6.0, 65).await;
 }
