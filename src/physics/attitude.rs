@@ -1,6 +1,6 @@
 //! Attitude: which way the body points. Quaternions are scalar first and turn inertial components into body components.
 //!
-//! v_body = C v_inertial with C[0][0] = 1-2(y^2+z^2), C[0][1] = 2(xy-wz), C[1][0] = 2(xy+wz) and so on: numerically the
+//! v_body = C v_inertial with `C[0][0] = 1-2(y^2+z^2), C[0][1] = 2(xy-wz), C[1][0] = 2(xy+wz)` and so on: numerically the
 //! matrix that nalgebra's `UnitQuaternion` stands for, read as *body from inertial*.
 //!
 //! The local vertical frame (LVLH): +x forward, in the plane, at right angles to the radius; +y opposite the orbit normal; +z

@@ -299,7 +299,7 @@ fn attitude(
             let progress = if current == 0 { 1.0 } else { ((times_s[k] - plan[current].from_s) / slew_s).min(1.0) };
             let held = if progress < 1.0 {
                 let old = target(&plan[current - 1], k);
-                let turn = nearest_turn((new * old.inverse()).scaled_axis(), turned);
+                let turn = nearest_turn(turn_vector(&(new * old.inverse())), turned);
                 turned = Some(turn);
                 let smooth = progress.powi(3) * (10.0 - 15.0 * progress + 6.0 * progress * progress);
                 Rotation3::new(turn * smooth) * old
@@ -318,6 +318,11 @@ fn attitude(
         .collect()
 }
 
+/// Axis times angle. By the quaternion: from the matrix both are lost near half a turn and near none.
+fn turn_vector(turn: &Rotation3<f64>) -> Vector3<f64> {
+    nalgebra::UnitQuaternion::from_rotation_matrix(turn).scaled_axis()
+}
+
 /// The same turn the way round that is nearer to the turn a moment before: near half a turn the shorter way changes sides.
 fn nearest_turn(turn: Vector3<f64>, before: Option<Vector3<f64>>) -> Vector3<f64> {
     let Some(before) = before else { return turn };
@@ -333,7 +338,7 @@ fn rates(body: &[Rotation3<f64>]) -> Vec<Vector3<f64>> {
         .map(|k| {
             let (a, b) = (k.saturating_sub(1), (k + 1).min(last));
             let turn = body[b] * body[a].inverse();
-            -turn.scaled_axis() / (STEP_S * (b - a) as f64)
+            -turn_vector(&turn) / (STEP_S * (b - a) as f64)
         })
         .collect()
 }

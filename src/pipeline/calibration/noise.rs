@@ -20,6 +20,15 @@ const PRIOR_DIFFERENCES: f64 = 60.0;
 /// A difference counts no more than this many variances: windows disturbed by bursts say nothing of the rest.
 const VARIANCES_MAX: f64 = 12.0;
 
+/// The factor is given in steps of 5 %, finer than the error bar needs: otherwise every late window would revise the
+/// error bar, and with it the revision, of every other.
+const FACTOR_STEP: f64 = 0.05;
+
+/// Rounded to whole steps of its logarithm.
+fn in_steps(factor: f64) -> f64 {
+    ((factor.ln() / FACTOR_STEP).round() * FACTOR_STEP).exp()
+}
+
 /// What the windows up to some clock say of the noise, per OARE axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NoiseFactors {
@@ -105,7 +114,7 @@ impl NoiseHistory {
         // All axes have the same filter: their common factor first, then what sets one apart.
         let common = (pooled.0 + PRIOR_DIFFERENCES * prior) / (pooled.1 + PRIOR_DIFFERENCES);
         NoiseFactors {
-            factor: sums.map(|s| ((s.ratio + 500.0 * common) / (s.differences + 500.0)).sqrt()),
+            factor: sums.map(|s| in_steps(((s.ratio + 500.0 * common) / (s.differences + 500.0)).sqrt())),
             half_drift_variance_ng2: sums.map(|s| if s.slopes > 50.0 { (s.slope / s.slopes).max(0.0) } else { 0.0 }),
             signal_differences: sums.map(|s| {
                 let n = s.halves.max(1.0);
