@@ -130,10 +130,8 @@ pub fn derive(
     }
     derived.estimated = derived.estimates.last().cloned();
     derived.timeline = match known {
-        Some(known) => {
-            let latest = windows.values().next_back().map_or(Clock::from_tenths(0), |w| w.known_since);
-            vec![Calibration { noise: Some(history.at(latest, configured)), ..known.calibration(settings) }]
-        }
+        // What is known beforehand does not change with the windows: its noise factor is the configured one.
+        Some(known) => vec![known.calibration(settings)],
         None => derived.estimates.clone(),
     };
     derived.one_sided = one_sided::compare(archive, law);
