@@ -10,7 +10,7 @@ use oare_ground::diagnose::answer::{Diagnosis, Verdict};
 use oare_ground::diagnose::case::{Case, Header, Texts};
 use oare_ground::diagnose::error::CaseError;
 use oare_ground::diagnose::measured::{self, MeasuredCase};
-use oare_ground::diagnose::report;
+use oare_ground::diagnose::{recorder, report};
 use rayon::prelude::*;
 
 /// Says what physics a simulation left out, from a case directory.
@@ -145,12 +145,17 @@ pub fn read_case(directory: &Path, set: &[String]) -> Result<Case, CaseError> {
     let toml = text("case.toml")
         .ok_or_else(|| CaseError::MissingFile { file: directory.join("case.toml").display().to_string() })?;
     let header = Header::parse(&toml, set)?;
-    if header.kind != "acceleration_csv" {
-        return Err(CaseError::Kind(header.kind));
-    }
     let named = |name: &str| if name.is_empty() { None } else { text(name) };
+    let recording = match header.kind.as_str() {
+        "acceleration_csv" => named(&header.files.recording),
+        "recorder_dump" => {
+            let dump = std::fs::read(directory.join(&header.files.recording)).ok();
+            dump.map(|dump| recorder::recording_csv(&dump, &header))
+        }
+        _ => return Err(CaseError::Kind(header.kind)),
+    };
     let texts = Texts {
-        recording: named(&header.files.recording),
+        recording,
         simulation: named(&header.files.simulation),
         ancillary: named(&header.files.ancillary),
         events: named(&header.files.events),

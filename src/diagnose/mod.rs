@@ -20,6 +20,7 @@ pub mod open_form;
 mod optimise;
 pub mod orbit;
 pub mod poses;
+pub mod recorder;
 pub mod report;
 pub mod scene;
 pub mod search;

@@ -56,6 +56,20 @@ fn a_simulation_that_claims_gravity_gradient_and_lacks_it_is_found_out() {
 }
 
 #[test]
+fn a_dump_goes_through_the_whole_calibration_and_two_effects_are_named() {
+    let Some((toml, mut texts)) = texts("open-30") else { return };
+    let dump = std::fs::read(shared().join("cases/open-30/recording.dump")).unwrap();
+    let header = Header::parse(&toml, &[]).unwrap();
+    texts.recording = Some(oare_ground::diagnose::recorder::recording_csv(&dump, &header));
+    let d = diagnose(&Case::from_texts(header, &texts).unwrap(), &Settings::default()).unwrap();
+    let mut named = ids(&d);
+    named.sort_unstable();
+    assert_eq!((d.verdict, named), (Verdict::Explained, vec!["cg_offset", "water_dump"]), "{d:?}");
+    let dump_z = d.effects.iter().flat_map(|e| &e.parameters).find(|p| p.name == "az_ng").unwrap();
+    assert!((dump_z.value + 369.9).abs() < 4.0 * dump_z.sigma, "{dump_z:?}");
+}
+
+#[test]
 fn drag_and_a_leak_together_are_both_named_with_their_sizes() {
     let Some(d) = answer("open-25") else { return };
     assert_eq!(d.verdict, Verdict::Explained, "{d:?}");
