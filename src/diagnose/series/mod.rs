@@ -1,10 +1,13 @@
 //! A calibrated sensor's series against what its simulation holds (a constant, as a rule): what it follows beside, axis by
 //! axis, with controls in which nothing is expected.
 //!
-//! Everything is judged on block means, and evidence counts only as many values as the residual has independent ones
-//! (its memory is measured): a slow wander agrees with any slow covariate by chance. Not here: orbits, poses.
+//! Everything is judged on block means, against a slow wander as the competitor (`red`): a wander agrees with any slow
+//! covariate by chance. Standard errors count as many values as the residual has independent ones (its memory). Not here: orbits, poses.
 
 pub mod read;
+mod red;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 
@@ -18,9 +21,9 @@ use crate::diagnose::measured::answer::{
 use crate::diagnose::measured::spread::{median, memory};
 use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError};
 
-/// Evidence needed to claim an effect: chance reaches it once in 55. A second gate follows: it must predict blocks that
-/// the fit has not seen.
-const SCORE_MIN: f64 = 8.0;
+/// Evidence needed to claim an effect, over red noise. A second gate follows: it must predict blocks that the fit has not
+/// seen. Red noise of any memory passes both less than once in a hundred series.
+const SCORE_MIN: f64 = 18.0;
 /// A late response must beat the immediate one by this much: its time constant was looked for.
 const LATE_MARGIN: f64 = 18.0;
 /// Time constants tried for a late response, s.
@@ -95,6 +98,8 @@ pub struct Regression {
     pub residuals: Vec<f64>,
     /// How many blocks carry as much as one independent one.
     pub memory: f64,
+    /// Twice the log likelihood in red noise.
+    pub likelihood: f64,
 }
 
 impl Regression {
@@ -116,13 +121,14 @@ pub fn regress(series: &Series, values: &[f64], effects: &[Follows]) -> Regressi
     let residual = &y - &design * &solution;
     let residuals: Vec<f64> = residual.iter().copied().collect();
     let memory = memory(std::slice::from_ref(&residuals));
+    let likelihood = red::twice_log_likelihood(values, &design);
     // With memory, what is estimated from the data also leaves the residual with less of it: count independent values.
     let independent = (residuals.len() as f64 / memory).max(k as f64 + 2.0);
     let variance = residual.norm_squared() / residuals.len() as f64 * independent / (independent - k as f64);
     let one = |j: usize| {
         (solution[constants + j], (variance * memory * inverse[(constants + j, constants + j)]).max(0.0).sqrt())
     };
-    Regression { coefficients: (0..effects.len()).map(one).collect(), residuals, memory }
+    Regression { coefficients: (0..effects.len()).map(one).collect(), residuals, memory, likelihood }
 }
 
 fn design(series: &Series, effects: &[Follows]) -> DMatrix<f64> {
@@ -190,9 +196,7 @@ pub fn search(series: &Series, values: &[f64], included: &[Follows]) -> AxisFoun
 }
 
 fn evidence(before: &Regression, after: &Regression, price: f64) -> f64 {
-    // The memory of the richer model: a covariate that takes away the slow part leaves shorter memory behind.
-    let n = (after.residuals.len() as f64 / after.memory).max(6.0);
-    2.0 * n * (before.rms() / after.rms().max(1e-300)).ln() - price * n.ln()
+    after.likelihood - before.likelihood - price * (after.residuals.len() as f64).ln()
 }
 
 fn candidates(series: &Series) -> Vec<Follows> {
