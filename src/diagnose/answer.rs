@@ -214,8 +214,8 @@ pub struct SeparatingObservation {
     pub kind: String,
     /// What to do.
     pub text: String,
-    /// Matched-filter SNR by which the sets would then differ, less what they differ by now.
-    pub gain: f64,
+    /// Matched-filter SNR by which the sets would then differ, less what they differ by now; None where it was not simulated.
+    pub gain: Option<f64>,
 }
 
 /// One satellite's part of an orbit case.

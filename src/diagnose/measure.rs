@@ -79,6 +79,19 @@ impl Measurement {
     }
 }
 
+/// Spans in order, those that overlap or touch made one.
+pub fn union(mut spans: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut merged: Vec<[f64; 2]> = Vec::new();
+    for [from, to] in spans {
+        match merged.last_mut() {
+            Some(last) if from <= last[1] => last[1] = last[1].max(to),
+            _ => merged.push([from, to]),
+        }
+    }
+    merged
+}
+
 /// Share of each window that lies inside any of the spans; overlapping spans count each.
 pub fn coverage(clock_s: &[f64], spans: &[[f64; 2]]) -> Vec<f64> {
     let mut share = vec![0.0; clock_s.len()];
@@ -142,6 +155,8 @@ mod tests {
     #[test]
     fn a_pulse_inside_the_window_counts_by_its_share() {
         assert_eq!(coverage(&[100.0, 125.0, 150.0], &[[110.0, 130.0]]), vec![0.3, 0.4, 0.1]);
+        let overlapping = vec![[120.0, 130.0], [110.0, 125.0], [400.0, 410.0]];
+        assert_eq!(union(overlapping), [[110.0, 130.0], [400.0, 410.0]]);
         let step = decay(&[100.0, 125.0, 150.0], 125.0, f64::INFINITY);
         assert_eq!(step, vec![0.0, 0.5, 1.0]);
         let slow = decay(&[100.0, 125.0, 150.0], 125.0, 1e9);

@@ -1,9 +1,10 @@
 //! How high the search scores on records in which nothing is missing.
 //!
 //! The statistic is the log posterior odds of the best hypothesis against none, the noise fitted anew for every
-//! hypothesis: the maximum over everything searched. The table was made once from simulated records of noise alone (white
-//! and short noise at activity, slow noise of 0-30 ng and 5 min-3 h beside it); beyond it the tail falls as exp(-T), which
-//! is the bound of Ville for evidence ratios and steeper than anything seen.
+//! hypothesis: the maximum over everything searched. The table comes from 600 simulated records of noise alone (white
+//! and short noise at activity, slow noise of 0-30 ng and 5 min-3 h beside it), moved by the change of the priors since: it was not
+//! simulated again with those, and below about one in 600 it is extrapolated. Beyond it the tail falls as exp(-T), the bound of
+//! Ville for evidence ratios. Where the probability itself matters, ask for the bootstrap.
 
 /// Statistic, and the share of records of noise alone that reach it.
 const TABLE: [(f64, f64); 8] =

@@ -275,13 +275,13 @@ fn separating(sets: &[Vec<String>]) -> SeparatingObservation {
         return SeparatingObservation {
             kind: "table_flip".into(),
             text: "Measure with the table turned by 180 degrees: what belongs to the sensor changes sign in body axes, a real acceleration does not.".into(),
-            gain: 0.0,
+            gain: None,
         };
     }
     SeparatingObservation {
         kind: "attitude".into(),
         text: "Hold another attitude for six hours, the ram direction along a different body axis: the sets predict different axes then.".into(),
-        gain: 0.0,
+        gain: None,
     }
 }
 

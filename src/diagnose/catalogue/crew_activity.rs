@@ -1,6 +1,6 @@
 //! A shift between sleep and wake, wake minus sleep.
 
-use super::{COMMON, Effect, Shape, logged, no_volume, one_point, push};
+use super::{COMMON, Effect, Shape, lasting, no_volume, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -20,5 +20,5 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    logged(scene, "crew_sleep").map(|asleep| Shape::Scalar(asleep.iter().map(|s| 1.0 - s).collect()))
+    lasting(scene, "crew_sleep").map(|asleep| Shape::Scalar(asleep.iter().map(|s| 1.0 - s).collect()))
 }

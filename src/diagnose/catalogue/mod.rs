@@ -175,9 +175,19 @@ pub fn onsets(scene: &Scene, spacing_s: f64, margin_s: f64) -> Vec<f64> {
     (0..=n).map(|i| start + margin_s + i as f64 * spacing_s).collect()
 }
 
-/// The series of a logged kind, if the log has it inside the record.
-pub fn logged(scene: &Scene, kind: &str) -> Option<Vec<f64>> {
-    let share = super::measure::coverage(scene.clock_s(), &scene.case.spans(kind));
+/// The series of a push that lasts while an entry of the kind does, if the log has it inside the record: entries that overlap
+/// are one push.
+pub fn lasting(scene: &Scene, kind: &str) -> Option<Vec<f64>> {
+    share_of(scene, &super::measure::union(scene.case.spans(kind)))
+}
+
+/// The series of a push that every entry of the kind adds, such as a firing, if the log has it inside the record.
+pub fn added(scene: &Scene, kind: &str) -> Option<Vec<f64>> {
+    share_of(scene, &scene.case.spans(kind))
+}
+
+fn share_of(scene: &Scene, spans: &[[f64; 2]]) -> Option<Vec<f64>> {
+    let share = super::measure::coverage(scene.clock_s(), spans);
     let windows = share.iter().filter(|s| **s > 0.0).count();
     (windows >= 2 && windows + 2 <= share.len()).then_some(share)
 }

@@ -1,6 +1,6 @@
 //! A push while a logged event of kind `thruster` lasts.
 
-use super::{COMMON, Effect, Shape, logged, no_volume, one_point, push};
+use super::{COMMON, Effect, Shape, added, no_volume, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -20,5 +20,5 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    logged(scene, "thruster").map(Shape::Scalar)
+    added(scene, "thruster").map(Shape::Scalar)
 }

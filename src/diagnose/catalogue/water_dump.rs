@@ -1,6 +1,6 @@
 //! A push while a logged event of kind `water_dump` lasts.
 
-use super::{COMMON, Effect, Shape, logged, no_volume, one_point, push};
+use super::{COMMON, Effect, Shape, lasting, no_volume, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -20,5 +20,5 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    logged(scene, "water_dump").map(Shape::Scalar)
+    lasting(scene, "water_dump").map(Shape::Scalar)
 }

@@ -284,13 +284,11 @@ fn competition(page: &mut String, d: &Diagnosis) {
         page.push_str("</ul>\n");
     }
     if let Some(s) = &d.separating_observation {
-        let _ = writeln!(
-            page,
-            "<p>The cheapest observation that would decide ({}): {} It would separate them by {} standard errors.</p>",
-            escaped(&words(&s.kind)),
-            escaped(&s.text),
-            figure(s.gain)
-        );
+        let gain = s
+            .gain
+            .map_or(String::new(), |gain| format!(" It would separate them by {} standard errors.", figure(gain)));
+        let (kind, text) = (escaped(&words(&s.kind)), escaped(&s.text));
+        let _ = writeln!(page, "<p>The cheapest observation that would decide ({kind}): {text}{gain}</p>");
     }
     if !d.alternatives.is_empty() {
         let rows = d.alternatives.iter().map(|a| vec![joined(&a.effects), figure(a.posterior), figure(a.delta_bic)]);

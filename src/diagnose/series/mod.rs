@@ -22,7 +22,7 @@ use crate::diagnose::measured::spread::{median, memory};
 use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError};
 
 /// Evidence needed to claim an effect, over red noise. A second gate follows: it must predict blocks that the fit has not
-/// seen. Red noise of any memory passes both less than once in a hundred series.
+/// seen. Of 100 series of red noise at most one passes both (`series::tests`); rarer false alarms are not shown.
 const SCORE_MIN: f64 = 18.0;
 /// A late response must beat the immediate one by this much: its time constant was looked for.
 const LATE_MARGIN: f64 = 18.0;
