@@ -13,7 +13,7 @@ use thiserror::Error;
 use self::arc::Arc;
 use self::forces::{Baseline, Environment, Term};
 use self::search::Problem;
-use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, lookup, texts};
+use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates, lookup, texts};
 use crate::physics::earth_orientation::{EarthOrientation, EarthOrientationError};
 use crate::physics::gravity_field::{GravityField, GravityFieldError};
 
@@ -68,10 +68,10 @@ pub enum OrbitError {
 }
 
 /// Analyse an orbit case.
-pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Answer, MeasuredError> {
+pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
     let problem = problem(case, files)?;
     let search = problem.search(&mut |_| ());
-    Ok(report::answer(&case.id, &problem, &search))
+    Ok((report::answer(&case.id, &problem, &search), report::plates(&problem, &search)))
 }
 
 /// The case's arcs and forces.

@@ -4,7 +4,8 @@ use super::arc::{Arc, ArcFit};
 use super::forces::Term;
 use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m};
 use crate::diagnose::answer::{Alternative, Interval, Located, ParameterAnswer, Verdict};
-use crate::diagnose::measured::Answer;
+use crate::diagnose::measured::plates::OrbitPlate;
+use crate::diagnose::measured::{Answer, Plates};
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, StepAnswer, parameter, posterior,
 };
@@ -50,6 +51,22 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
         effects,
         arcs,
     }
+}
+
+/// Numbers for the figures.
+pub fn plates(problem: &Problem, search: &Search) -> Plates {
+    let each = |of: &dyn Fn(&Arc, &ArcFit) -> Option<f64>| {
+        let level = |level: &Level| problem.arcs.iter().zip(&level.fits).filter_map(|(arc, fit)| of(arc, fit)).collect();
+        search.levels.iter().map(level).collect::<Vec<Vec<f64>>>()
+    };
+    let added = |level: &Level| level.accepted.last().map_or("as it stands", |(term, _)| term.id()).to_owned();
+    Plates::Orbit(OrbitPlate {
+        arcs: problem.arcs.iter().map(|arc| arc.id.clone()).collect(),
+        added: search.levels.iter().map(added).collect(),
+        rms_m: each(&|arc, fit| Some(fit.rms_m(0..arc.fitted))),
+        predicted_m: each(&predicted_m),
+        rms_max_m: problem.rms_max_m(),
+    })
 }
 
 /// Estimates of every accepted term in every arc.
