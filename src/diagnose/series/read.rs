@@ -10,6 +10,8 @@ const BLOCKS: f64 = 600.0;
 /// With a reference beside it a series can be dated against it: blocks are then finer.
 const BLOCKS_WITH_REFERENCE: f64 = 3_000.0;
 const BLOCKS_MIN: usize = 40;
+/// A span of fewer blocks tells nothing beside its own constant, and is left out.
+const SPAN_BLOCKS_MIN: usize = 8;
 /// A row this many scatters from the median of its block is a blunder, in blocks of so many rows or more.
 const BLUNDER_SCATTERS: f64 = 12.0;
 const BLUNDER_ROWS_MIN: usize = 8;
@@ -246,7 +248,9 @@ fn blocks(t_s: &[f64], table: &[Vec<f64>], spans: &[[f64; 2]], count: f64) -> Bl
         members.entry((*span, (t_s[*i] / length).floor() as i64)).or_default().push(*i);
     }
     let mut out = Blocks { t_s: Vec::new(), span: Vec::new(), table: vec![Vec::new(); table.len()], masked: 0 };
-    for ((span, _), rows) in members {
+    let blocks_of = |span: usize| members.keys().filter(|(s, _)| *s == span).count();
+    let long: Vec<bool> = (0..spans.len().max(1)).map(|span| blocks_of(span) >= SPAN_BLOCKS_MIN).collect();
+    for ((span, _), rows) in members.into_iter().filter(|((span, _), _)| long[*span]) {
         let kept = agreeing(&rows, table);
         out.masked += rows.len() - kept.len();
         let mean = |column: &[f64]| kept.iter().map(|i| column[*i]).sum::<f64>() / kept.len() as f64;

@@ -198,3 +198,17 @@ fn an_offset_of_the_clock_is_found_with_its_sign() {
     }
     assert!(named == 10 && within >= 9, "{named} named, {within} within");
 }
+
+#[test]
+fn spans_of_their_own_level_share_one_slope() {
+    let mut rng = ChaCha12Rng::seed_from_u64(7);
+    let mut series = series(&mut rng);
+    series.spans = 3;
+    series.span = (0..BLOCKS).map(|i| [0, 0, 0, 0, 0, 0, 1, 1, 2, 2][i / 20]).collect();
+    let noise = red(&mut rng, 5.0, 0.3);
+    let of = |(i, n): (usize, &f64)| 0.3 * n + 0.8 * series.covariates[0].values[i] + 9.0 * series.span[i] as f64;
+    let values = noise.iter().enumerate().map(of).collect();
+    let (follows, (slope, sigma), _) = first(&series, &axis(values)).expect("an effect");
+    assert_eq!(follows.id(), "temperature_bias");
+    assert!((slope - 0.8).abs() < 2.0 * sigma, "{slope} {sigma}");
+}
