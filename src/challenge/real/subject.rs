@@ -68,6 +68,7 @@ fn orbits(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Vec<S
             baseline: full.clone(),
             arcs: vec![arc.clone()],
             sigma_m: all.sigma_m,
+            left_out: Vec::new(),
         };
         let level = problem.fit(&full, Vec::new(), None);
         let degree_left = DEGREES_LEFT[i % DEGREES_LEFT.len()];
@@ -163,6 +164,7 @@ fn orbit_said(problem: &Problem, degree_left: usize, removed: &str) -> Said {
         baseline,
         arcs: problem.arcs.clone(),
         sigma_m: problem.sigma_m,
+        left_out: Vec::new(),
     };
     let answer = report::answer("", &reduced, &reduced.search(&mut |_| ()));
     let arc = &answer.arcs[0];
