@@ -81,11 +81,7 @@ struct Satellite {
 
 fn gps(id: &'static str, node_deg: f64, latitude_deg: f64) -> Satellite {
     let start = circular(GPS_HEIGHT_M, 55.0, node_deg, latitude_deg);
-    let terms = vec![
-        (Term::SolarRadiation, [9.3e-8, 0.0]),
-        (Term::YBias, [4e-10, 0.0]),
-        (Term::BBias, [-6e-10, 0.0]),
-    ];
+    let terms = vec![(Term::SolarRadiation, [9.3e-8, 0.0]), (Term::YBias, [4e-10, 0.0]), (Term::BBias, [-6e-10, 0.0])];
     Satellite { id, start, terms, kick: None }
 }
 
@@ -236,7 +232,12 @@ fn the_sun_is_missed_in_the_geostationary_ring() {
 /// A satellite low enough to feel the air.
 fn low() -> Satellite {
     let start = circular(480e3, 89.0, 30.0, 0.0);
-    Satellite { id: "L09", start, terms: vec![(Term::SolarRadiation, [3e-8, 0.0]), (Term::Drag, [1.7, 0.0])], kick: None }
+    Satellite {
+        id: "L09",
+        start,
+        terms: vec![(Term::SolarRadiation, [3e-8, 0.0]), (Term::Drag, [1.7, 0.0])],
+        kick: None,
+    }
 }
 
 #[test]
@@ -296,14 +297,17 @@ fn what_cannot_be_used_is_told_in_one_sentence() {
     let made = Made { date: (2015, 7, 7), spacing_s: 900.0, hours: 6.0, satellites: vec![gps("G01", 0.0, 10.0)] };
     let sp3 = made.sp3();
     let said = |text: String, includes: &[&str]| made.diagnose_text(text, includes).expect_err("an error").to_string();
-    assert_eq!(
-        said("<html>".to_owned(), &ALL),
-        "a.sp3, line 1: expected a line starting with #, found \"<html>\""
-    );
+    assert_eq!(said("<html>".to_owned(), &ALL), "a.sp3, line 1: expected a line starting with #, found \"<html>\"");
     assert_eq!(said(sp3.lines().take(2).collect::<Vec<_>>().join("\n"), &ALL), "the recording does not hold an epoch");
-    assert!(said(sp3.replace("PG01", "PG01 x"), &ALL).contains("line 4: expected P, a satellite and three coordinates"));
+    assert!(
+        said(sp3.replace("PG01", "PG01 x"), &ALL).contains("line 4: expected P, a satellite and three coordinates")
+    );
     let other_day = sp3.replace("*  2015", "*  1999");
-    assert!(said(other_day, &ALL).starts_with("Earth orientation covers MJD"), "{}", said(sp3.replace("*  2015", "*  1999"), &ALL));
+    assert!(
+        said(other_day, &ALL).starts_with("Earth orientation covers MJD"),
+        "{}",
+        said(sp3.replace("*  2015", "*  1999"), &ALL)
+    );
     assert!(said(sp3.clone(), &["gravity:12", "tea"]).ends_with("found \"tea\""));
     let short: String = sp3.lines().take(2 + 3 * 5).map(|l| format!("{l}\n")).collect();
     assert_eq!(said(short, &ALL), "G01 has 5 usable positions to fit, expected at least 12");

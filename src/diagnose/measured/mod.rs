@@ -160,10 +160,7 @@ pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result
 }
 
 /// The same, with the numbers behind its figures.
-pub fn analyse(
-    case: &MeasuredCase,
-    files: &BTreeMap<String, String>,
-) -> Result<(Answer, Plates), MeasuredError> {
+pub fn analyse(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
     for name in case.files() {
         if !files.contains_key(&name) {
             return Err(MeasuredError::MissingFile { file: name });

@@ -115,7 +115,8 @@ impl Arc {
             let mut bare = self.first_guess(&[], &[], None);
             let mut span_s = FIRST_REVOLUTIONS * STEPS_PER_REVOLUTION * self.step_s;
             while span_s < self.t_s[self.fitted - 1] - self.t_s[0] {
-                let epochs = self.t_s.partition_point(|t| *t <= self.t_s[0] + span_s).max(FIRST_EPOCHS).min(self.fitted);
+                let epochs =
+                    self.t_s.partition_point(|t| *t <= self.t_s[0] + span_s).max(FIRST_EPOCHS).min(self.fitted);
                 self.iterate(environment, baseline, &mut bare, epochs);
                 span_s *= GROWTH;
             }
@@ -138,10 +139,8 @@ impl Arc {
                 best = Some((rms, fit.clone()));
             }
             let design = fit.partials.view((0, 0), (3 * epochs, fit.partials.ncols())).into_owned();
-            let residuals = DVector::from_iterator(
-                3 * epochs,
-                fit.residuals_m[..epochs].iter().flat_map(|r| [r.x, r.y, r.z]),
-            );
+            let residuals =
+                DVector::from_iterator(3 * epochs, fit.residuals_m[..epochs].iter().flat_map(|r| [r.x, r.y, r.z]));
             let Some(step) = solve(&design, &residuals) else { break };
             let moved_m = (&design * &step).amax();
             if !moved_m.is_finite() {

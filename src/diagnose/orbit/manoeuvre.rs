@@ -1,17 +1,21 @@
 //! A velocity step of one satellite: looked for at every epoch by the columns it would have, then fitted with its instant.
 //!
-//! It belongs to one arc and is no common cause. It is claimed only where it leaves what the stated accuracy allows: four
-//! free numbers and an instant take something off any odd arc. Not here: terms that push all the time (`search`).
+//! It belongs to one arc and is no common cause. It is claimed only where it leaves what the stated accuracy allows, and is
+//! larger than what an unlisted push gains over the arc: four free numbers take something off any odd arc. Not here: terms that push all the time (`search`).
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 
 use super::arc::{Arc, ArcFit, Impulse, solve};
-use super::search::{Level, Problem, SCORE_MIN, covariance, independent, residual};
+use super::search::{Level, Problem, SCORE_MIN, UNLISTED_M_S2, covariance, independent, residual};
 
 /// Epochs at either end of an arc between which an instant is looked for.
 const EDGE_EPOCHS: usize = 4;
 /// A velocity step taken before all common terms are known must leave less than this part of the rms.
 const PROVISIONAL: f64 = 0.1;
+/// In any case it must leave less than this part.
+const LEFT_MAX: f64 = 0.2;
+/// A step is told from an unlisted push that lasts when it is this many times what such a push gains over the arc.
+const UNLISTED_TIMES: f64 = 10.0;
 /// Unknowns of a velocity step.
 const UNKNOWNS: f64 = 4.0;
 
@@ -47,6 +51,10 @@ pub fn step(problem: &Problem, level: &Level, rivals: &[f64]) -> Option<Level> {
         }
         let Some(tried) = fitted(problem, level, i) else { continue };
         let is = tried.rms_m(0..arc.fitted);
+        let small = tried.impulse.is_none_or(|impulse| impulse.dv_m_s.norm() < least_m_s(arc));
+        if small || is > LEFT_MAX * was {
+            continue;
+        }
         let enough = is <= problem.rms_max_m() || (is < PROVISIONAL * was && is < PROVISIONAL * rivals[i]);
         if enough && score(arc, &tried, [was, is]) > SCORE_MIN {
             next.fits[i] = tried;
@@ -68,6 +76,11 @@ pub fn unproven(problem: &Problem, level: &Level) -> Vec<usize> {
 /// What was found, with the errors of the last level.
 pub fn found(problem: &Problem, level: &Level) -> Vec<Manoeuvre> {
     (0..problem.arcs.len()).filter_map(|i| described(problem, level, i)).collect()
+}
+
+/// Smallest velocity step that can be claimed in an arc, m/s.
+fn least_m_s(arc: &Arc) -> f64 {
+    UNLISTED_TIMES * UNLISTED_M_S2 * (arc.t_s[arc.fitted - 1] - arc.t_s[0])
 }
 
 fn score(arc: &Arc, with: &ArcFit, [was, is]: [f64; 2]) -> f64 {
@@ -98,7 +111,11 @@ fn fitted(problem: &Problem, level: &Level, i: usize) -> Option<ArcFit> {
         let left = (&y - columns * &step).norm_squared();
         Some((k, step, left))
     });
-    let (k, step, _) = tried.min_by(|a, b| a.2.total_cmp(&b.2))?;
+    let (k, step, left) = tried.min_by(|a, b| a.2.total_cmp(&b.2))?;
+    // Linear columns see an orbit that is still bent to the step: only what is far from enough is turned away here.
+    if left > 0.25 * y.norm_squared() || step.norm() < 0.3 * least_m_s(arc) {
+        return None;
+    }
     let mut from = fit.clone();
     // Half a spacing before the epoch: the instant is free on both sides.
     let at_s = 0.5 * (arc.t_s[k] + arc.t_s[k - 1]);

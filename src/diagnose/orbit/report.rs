@@ -5,12 +5,12 @@ use super::forces::Term;
 use super::manoeuvre::Manoeuvre;
 use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m};
 use crate::diagnose::answer::{Alternative, Interval, Located, ParameterAnswer, Verdict};
-use crate::diagnose::measured::plates::OrbitPlate;
-use crate::diagnose::measured::{Answer, Plates};
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, StepAnswer, parameter, posterior,
 };
+use crate::diagnose::measured::plates::OrbitPlate;
 use crate::diagnose::measured::spread::{median, scatter};
+use crate::diagnose::measured::{Answer, Plates};
 
 /// Every arc's estimates of every accepted term.
 pub type Table = Vec<(Term, f64, Vec<Vec<Estimate>>)>;
@@ -61,7 +61,8 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
 /// Numbers for the figures.
 pub fn plates(problem: &Problem, search: &Search) -> Plates {
     let each = |of: &dyn Fn(&Arc, &ArcFit) -> Option<f64>| {
-        let level = |level: &Level| problem.arcs.iter().zip(&level.fits).filter_map(|(arc, fit)| of(arc, fit)).collect();
+        let level =
+            |level: &Level| problem.arcs.iter().zip(&level.fits).filter_map(|(arc, fit)| of(arc, fit)).collect();
         search.levels.iter().map(level).collect::<Vec<Vec<f64>>>()
     };
     let added = |level: &Level| level.accepted.last().map_or("as it stands", |(term, _)| term.id()).to_owned();
@@ -190,12 +191,17 @@ fn arc_answer(problem: &Problem, search: &Search, table: &Table, i: usize) -> Ar
         let why = format!("3-D residual of this arc from {was:.3} m to {is:.3} m.");
         effects.push(effect(*term, evidence(arc, before, *term), parameters, why, vec![is]));
     }
-    effects.extend(search.manoeuvres.iter().filter(|one| one.arc == i).map(|one| manoeuvre_effect(problem, one, false)));
+    effects
+        .extend(search.manoeuvres.iter().filter(|one| one.arc == i).map(|one| manoeuvre_effect(problem, one, false)));
     let left = rms_after > problem.rms_max_m();
     let (verdict, effects, fitted_beside, note) = if left {
         let note = format!(
             "{} remain where {:.3} m is the most that the stated accuracy allows; nothing in the catalogue removes it.",
-            if rms_after.is_finite() { format!("{rms_after:.3} m") } else { "No orbit follows the positions: they".to_owned() },
+            if rms_after.is_finite() {
+                format!("{rms_after:.3} m")
+            } else {
+                "No orbit follows the positions: they".to_owned()
+            },
             problem.rms_max_m()
         );
         (Verdict::Unexplained, Vec::new(), effects, Some(note))

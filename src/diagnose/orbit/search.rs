@@ -25,7 +25,7 @@ const EXCESS_SPAN_S: f64 = 2.0 * 86_400.0;
 const AIR_TOP_M: f64 = 1.5e6;
 /// The size of those unlisted accelerations against which a known pull can be weighed (tides' finer terms, the Moon's
 /// analytic place, radiation from the Earth), m/s^2.
-const UNLISTED_M_S2: f64 = 3e-10;
+pub(super) const UNLISTED_M_S2: f64 = 3e-10;
 const STEPS_MAX: usize = 10;
 
 /// What is to be explained.

@@ -24,8 +24,7 @@ pub fn answer(case: &MeasuredCase, series: &Series, found: &[AxisFound]) -> Answ
         (true, true) => Verdict::Unexplained,
         (true, false) => Verdict::Consistent,
     };
-    let weakest =
-        measured.iter().flat_map(|row| row.found.effects.iter().map(|e| e.1)).fold(f64::INFINITY, f64::min);
+    let weakest = measured.iter().flat_map(|row| row.found.effects.iter().map(|e| e.1)).fold(f64::INFINITY, f64::min);
     let refused = measured.iter().map(|row| row.found.refused).fold(0.0, f64::max);
     let score = if weakest.is_finite() { weakest } else { refused };
     let notes = arcs.iter().filter_map(|arc| arc.note.as_ref().map(|note| format!("{}: {note}", arc.id)));
@@ -153,7 +152,12 @@ fn common_effects(rows: &[Row<'_>], arcs: &[ArcAnswer]) -> Vec<Effect> {
         ids.extend(arc.effects.iter().map(|e| e.id.as_str()));
     }
     let mut seen: Vec<&str> = Vec::new();
-    ids.retain(|id| !seen.contains(id) && { seen.push(id); true });
+    ids.retain(|id| {
+        !seen.contains(id) && {
+            seen.push(id);
+            true
+        }
+    });
     let merged = |id: &str| {
         let own: Vec<(&Row<'_>, &Effect)> =
             measured().filter_map(|(row, arc)| Some((row, arc.effects.iter().find(|e| e.id == id)?))).collect();
@@ -166,7 +170,9 @@ fn common_effects(rows: &[Row<'_>], arcs: &[ArcAnswer]) -> Vec<Effect> {
                 let of_all = matches!(p.name.as_str(), "lag_s" | "tau_s" | "onset_s" | "offset_s");
                 match (of_all, p.name == "fraction" && own.len() > 1) {
                     (true, _) => shared.push(p.clone()),
-                    (_, true) => parameters.push(ParameterAnswer { name: format!("fraction_{}", row.axis.name), ..p.clone() }),
+                    (_, true) => {
+                        parameters.push(ParameterAnswer { name: format!("fraction_{}", row.axis.name), ..p.clone() })
+                    }
                     _ => parameters.push(p.clone()),
                 }
             }
@@ -211,8 +217,7 @@ fn fit(measured: &[&Row<'_>]) -> Fit {
         Level { rms_total: rms.iter().map(|r| r * r).sum::<f64>().sqrt(), whitened_chi2_per_dof: median(chi2), rms }
     };
     let power = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
-    let before_rms: Vec<f64> =
-        measured.iter().map(|row| held_out(row.series, row.axis, &row.found.included)).collect();
+    let before_rms: Vec<f64> = measured.iter().map(|row| held_out(row.series, row.axis, &row.found.included)).collect();
     let after_rms: Vec<f64> = measured.iter().map(|row| held_out(row.series, row.axis, &row.found.model())).collect();
     let held = HeldOut {
         scheme: "blocks of six hours (or an eighth of what is shorter), every other one left out in turn".to_owned(),

@@ -304,7 +304,14 @@ fn inner_sigma(series: &Series, axis: &Axis, model: &[Follows], i: usize, beat: 
 }
 
 /// Add to each coefficient's error what the errors of the inner numbers do to it.
-fn widen(series: &Series, axis: &Axis, model: &[Follows], from: usize, sigmas: &[f64], coefficients: &mut [(f64, f64)]) {
+fn widen(
+    series: &Series,
+    axis: &Axis,
+    model: &[Follows],
+    from: usize,
+    sigmas: &[f64],
+    coefficients: &mut [(f64, f64)],
+) {
     for (k, sigma) in sigmas.iter().enumerate().filter(|(_, sigma)| **sigma > 0.0) {
         let moved = |by: f64| {
             let mut with = model.to_vec();
@@ -347,7 +354,8 @@ pub fn included(case: &MeasuredCase, series: &Series, axis: &Axis) -> Result<Vec
     for token in case.includes.iter().filter(|t| !matches!(t.as_str(), "constant" | "reference")) {
         let likely = |f: &Follows| likelihood(series, axis, std::slice::from_ref(f), &beat);
         let steps = likely_steps(series, axis, &model, &beat);
-        let of_kind = candidates(series, axis).into_iter().chain(steps).filter(|c| c.id() == token).map(|c| (c, likely(&c)));
+        let of_kind =
+            candidates(series, axis).into_iter().chain(steps).filter(|c| c.id() == token).map(|c| (c, likely(&c)));
         let Some((follows, _)) = of_kind.max_by(|a, b| a.1.total_cmp(&b.1)) else {
             return Err(case.wrong(
                 "simulation.includes",

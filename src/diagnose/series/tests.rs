@@ -144,7 +144,9 @@ fn a_late_response_gives_its_lag() {
         }
         late.push(state);
         let values = red(&mut rng, 10.0, 0.2).iter().zip(late).map(|(n, x)| 0.1 * n + 1.2 * x).collect();
-        let Some((Follows::Temperature(0, lag), (slope, sigma), found)) = first(&series, &axis(values)) else { continue };
+        let Some((Follows::Temperature(0, lag), (slope, sigma), found)) = first(&series, &axis(values)) else {
+            continue;
+        };
         named += 1;
         within += usize::from((lag - 6_000.0).abs() < 2.0 * found.inner_sigma[0] && (slope - 1.2).abs() < 2.0 * sigma);
     }
