@@ -30,6 +30,8 @@ enum Command {
     Export(command::export::Args),
     /// Says what physics a simulation left out, from a case directory.
     Diagnose(command::diagnose::Args),
+    /// A PAD file of the space station's archive: what it holds, and as CSV.
+    Pad(command::pad::Args),
     /// Makes, seals, runs and scores concealed cases.
     Challenge(command::challenge::Args),
 }
@@ -43,6 +45,7 @@ fn main() -> ExitCode {
         Command::Replay(args) => command::replay::run(args),
         Command::Export(args) => command::export::run(args),
         Command::Diagnose(args) => command::diagnose::run(args),
+        Command::Pad(args) => command::pad::run(args),
         Command::Challenge(args) => command::challenge::run(args),
     };
     done.unwrap_or_else(|error| {

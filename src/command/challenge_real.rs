@@ -1,13 +1,14 @@
 //! `oare challenge --real`: the lot over real recordings, and the evidence it leaves.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
 use indicatif::ProgressBar;
 use oare_ground::challenge::real::evidence::{Evidence, LIMITS, Whole};
 use oare_ground::challenge::real::{self, NOTHING, Outcome, Real, Score};
-use oare_ground::diagnose::measured::{self, Kind};
+use oare_ground::diagnose::measured::{self, Kind, Plates};
+use rayon::prelude::*;
 
 use super::challenge::bar;
 
@@ -19,7 +20,14 @@ pub fn run(dir: &Path, draws: usize, seed: u64, out: Option<&Path>) -> anyhow::R
         return Ok(super::DONE);
     }
     let progress = bar(folders.len(), "full models");
-    let read = Real::read(dir, &|| progress.inc(1))?;
+    let read = match Real::read(dir, &|| progress.inc(1)) {
+        Ok(read) => read,
+        Err(error) => {
+            progress.finish_and_clear();
+            eprintln!("oare: {error}");
+            return Ok(super::unusable());
+        }
+    };
     progress.finish_and_clear();
     let lots = read.draw(draws, seed);
     let commitment = real::commitment(&lots);
@@ -53,19 +61,23 @@ fn show(outcomes: &[Outcome], score: &Score) {
     println!("{LIMITS}");
 }
 
-fn write(out: &Path, folders: &[std::path::PathBuf], draws: Vec<Outcome>, score: Score) -> anyhow::Result<()> {
+fn write(out: &Path, folders: &[PathBuf], draws: Vec<Outcome>, score: Score) -> anyhow::Result<()> {
     std::fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
-    let progress: ProgressBar = bar(folders.len() + 1, "whole cases");
-    let mut cases = Vec::new();
+    let mut orders = Vec::new();
     for folder in folders {
-        for with in variants(folder)? {
-            let (case, files) = real::read(folder, &with)?;
-            let answer = measured::diagnose(&case, &files).with_context(|| folder.display().to_string())?;
-            let with = if with.is_empty() { "as it stands".to_owned() } else { with.join(", ") };
-            cases.push(Whole { with, answer });
-            progress.inc(1);
-        }
+        orders.extend(variants(folder)?.into_iter().map(|with| (folder, with)));
     }
+    let progress: ProgressBar = bar(orders.len(), "whole cases");
+    let one = |(folder, with): &(&PathBuf, Vec<String>)| {
+        let (case, files) = real::read(folder, with)?;
+        let (answer, plates) =
+            measured::analyse(&case, &files).with_context(|| folder.display().to_string())?;
+        let with = if with.is_empty() { "as it stands".to_owned() } else { with.join(", ") };
+        progress.inc(1);
+        anyhow::Ok((Whole { with, answer }, plates))
+    };
+    let wholes: Vec<(Whole, Plates)> = orders.par_iter().map(one).collect::<anyhow::Result<_>>()?;
+    let (cases, plates): (Vec<Whole>, Vec<Plates>) = wholes.into_iter().unzip();
     progress.finish_and_clear();
     let evidence = Evidence { limits: LIMITS, score, draws, cases };
     let file = |name: &str, text: String| {
@@ -73,7 +85,7 @@ fn write(out: &Path, folders: &[std::path::PathBuf], draws: Vec<Outcome>, score:
         std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
     };
     file("evidence.json", serde_json::to_string_pretty(&evidence)?)?;
-    file("evidence.html", evidence.html())?;
+    file("evidence.html", evidence.html(&plates))?;
     eprintln!("evidence in {}", out.display());
     Ok(())
 }

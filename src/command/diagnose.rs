@@ -47,8 +47,8 @@ pub struct Args {
 /// Orbits, series and poses: recordings of another kind, the same answer in their own unit.
 fn measured(args: &Args) -> anyhow::Result<ExitCode> {
     let read = oare_ground::challenge::real::read(&args.case, &args.set).map_err(anyhow::Error::from);
-    let answer = match read.and_then(|(case, files)| Ok(measured::diagnose(&case, &files)?)) {
-        Ok(answer) => answer,
+    let (answer, plates) = match read.and_then(|(case, files)| Ok(measured::analyse(&case, &files)?)) {
+        Ok(found) => found,
         Err(error) => {
             eprintln!("oare: {error:#}");
             return Ok(super::unusable());
@@ -59,13 +59,25 @@ fn measured(args: &Args) -> anyhow::Result<ExitCode> {
         write(out, &json)?;
     }
     if let Some(directory) = &args.report {
+        let drawn = measured::page::report(&answer, &plates);
+        write(&directory.join("index.html"), &drawn.html)?;
         write(&directory.join("diagnosis.json"), &json)?;
+        for (name, svg) in &drawn.figures {
+            write(&directory.join(name), svg)?;
+        }
     }
     if args.json {
         println!("{json}");
         return Ok(super::DONE);
     }
-    println!("{}: {:?}", answer.case, answer.verdict);
+    let verdict = serde_json::to_value(answer.verdict)?;
+    println!(
+        "{}: {} (false-alarm probability {:.1e})",
+        answer.case,
+        verdict.as_str().unwrap_or_default(),
+        answer.false_alarm_probability
+    );
+    println!("  {}", measured::page::sentence(&answer));
     for effect in &answer.effects {
         println!("  {}: {}", effect.id, effect.why);
         for p in &effect.parameters {

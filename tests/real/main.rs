@@ -2,6 +2,7 @@
 
 mod made;
 mod orbits;
+mod pad;
 mod sensors;
 
 use std::collections::BTreeMap;

@@ -1,9 +1,21 @@
 //! The evidence as one JSON document and one page for people. Every figure on the page comes from the document.
 
+use std::fmt::Write;
+
 use serde::Serialize;
 
 use super::{NOTHING, Outcome, Score};
-use crate::diagnose::measured::Answer;
+use crate::diagnose::answer::ParameterAnswer;
+use crate::diagnose::measured::page::{self, STYLE};
+use crate::diagnose::measured::{Answer, Plates};
+
+/// What this page has beside a case's own.
+const MORE: &str = "
+h2.case { font-size: 1.3em; margin-top: 2.6em; } h3 { font-size: 1em; margin: 1.6em 0 .3em; }
+tr.sum td { font-weight: bold; } tr.no td { background: #fbe4e1; } table.draws { font-size: 12px; }
+code { font-size: .8em; overflow-wrap: anywhere; }
+@media print { h2.case { break-before: page; } h3 { break-after: avoid; } table.draws, table { break-inside: auto; } table.draws { font-size: 7.5pt; } }
+";
 
 /// What must stand beside every claim.
 pub const LIMITS: &str = "No public low-frequency orbital accelerometer recording (OARE, MAMS, GRACE) was at hand: these recordings cover the same physics at the same level, and nothing is claimed beyond them.";
@@ -31,110 +43,121 @@ pub struct Whole {
 }
 
 impl Evidence {
-    /// The page.
-    pub fn html(&self) -> String {
-        let mut page = String::from(
-            "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>Real recordings: what was left out, and found</title>\
-             <style>body{font:15px/1.5 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}table{border-collapse:collapse;margin:1em 0}\
-             td,th{border:1px solid #bbb;padding:.2em .6em;text-align:left;vertical-align:top}.no{background:#fdd}</style>\n",
+    /// The page; the plates are those of the cases, in their order.
+    pub fn html(&self, plates: &[Plates]) -> String {
+        let mut page = String::new();
+        let _ = write!(
+            page,
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+             <title>Real recordings: what was left out, and found</title><style>{STYLE}{MORE}</style></head>\n<body>\n"
         );
         page.push_str("<h1>Real recordings: what was left out, and found</h1>\n");
-        page.push_str(&format!("<p><strong>{LIMITS}</strong></p>\n"));
-        page.push_str(&self.lot());
-        for whole in &self.cases {
-            page.push_str(&whole_case(whole));
+        let _ = writeln!(page, "<p class=\"sentence\">{}</p>", escaped(&self.summary()));
+        let _ = writeln!(page, "<p>{LIMITS}</p>");
+        self.lot(&mut page);
+        for (whole, plates) in self.cases.iter().zip(plates) {
+            let _ = writeln!(
+                page,
+                "<h2 class=\"case\">{}, {}</h2>",
+                escaped(&whole.answer.case),
+                escaped(&whole.with)
+            );
+            page.push_str(&page::section(&whole.answer, plates, "h3"));
         }
-        page.push_str(&self.table());
-        page.push_str("</html>\n");
+        self.table(&mut page);
+        page.push_str("</body></html>\n");
         page
     }
 
-    fn lot(&self) -> String {
-        let Score { removed, nothing, coefficients, commitment } = &self.score;
-        let row =
-            |what: &str, [good, of]: [usize; 2]| format!("<tr><td>{what}<td>{good} of {of}<td>{}", share(good, of));
+    fn summary(&self) -> String {
+        let Score { removed, nothing, coefficients, .. } = &self.score;
         format!(
-            "<h2>The lot</h2><p>Commitment published before the analysis: <code>{commitment}</code></p><table>{}{}{}</table>\n",
-            row("a term taken out: named rightly, and nothing beside it", *removed),
-            row("nothing taken out: answered with nothing", *nothing),
-            row("coefficients within two standard errors of the full model's", *coefficients),
+            "A term was taken out of the simulation by lot {} times, and named rightly and alone {} times; nothing was taken out {} \
+             times, and nothing named {} times. Of {} coefficients {} lie within two standard errors of the full model's.",
+            removed[1], removed[0], nothing[1], nothing[0], coefficients[1], coefficients[0]
         )
     }
 
-    fn table(&self) -> String {
-        let mut out = String::from(
-            "<h2>Every draw</h2><table><tr><th>#<th>recording<th>taken out<th>named<th>verdict<th>coefficients found<th>full model<th>rms before<th>after</tr>\n",
+    fn lot(&self, page: &mut String) {
+        let _ = writeln!(
+            page,
+            "<h2>The lot</h2>\n<p>The analyser sees a recording and what is left of its simulation, never the lot. Published before \
+             the analysis, as a hash over all lots: <code>{}</code></p>",
+            self.score.commitment
+        );
+        let mut terms: Vec<&str> = self.draws.iter().map(|d| d.truth.removed.as_str()).collect();
+        terms.sort_unstable();
+        terms.dedup();
+        page.push_str(
+            "<table><thead><tr><th>taken out</th><th class=\"n\">drawn</th><th class=\"n\">answered rightly</th>\
+             <th class=\"n\">coefficients within 2 sigma</th></tr></thead><tbody>\n",
+        );
+        for term in terms {
+            let of: Vec<&Outcome> = self.draws.iter().filter(|d| d.truth.removed == term).collect();
+            let right = of.iter().filter(|d| d.right).count();
+            let [within, compared] = of.iter().fold([0, 0], |[a, b], d| [a + d.within[0], b + d.within[1]]);
+            let coefficients = if compared > 0 { format!("{within} of {compared}") } else { String::new() };
+            let _ = writeln!(
+                page,
+                "<tr><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{right}</td><td class=\"n\">{coefficients}</td></tr>",
+                escaped(&words(term)),
+                of.len()
+            );
+        }
+        let Score { removed, nothing, coefficients, .. } = &self.score;
+        let right = removed[0] + nothing[0];
+        let _ = writeln!(
+            page,
+            "<tr class=\"sum\"><td>all</td><td class=\"n\">{}</td><td class=\"n\">{right} ({})</td>\
+             <td class=\"n\">{} of {} ({})</td></tr></tbody></table>",
+            self.draws.len(),
+            share(right, self.draws.len()),
+            coefficients[0],
+            coefficients[1],
+            share(coefficients[0], coefficients[1])
+        );
+    }
+
+    fn table(&self, page: &mut String) {
+        page.push_str(
+            "<h2 class=\"case\">Every draw</h2>\n<table class=\"draws\"><thead><tr><th class=\"n\">#</th><th>recording</th>\
+             <th>taken out</th><th>named</th><th>found</th><th>full model</th><th class=\"n\">rms before</th>\
+             <th class=\"n\">after</th></tr></thead><tbody>\n",
         );
         for draw in &self.draws {
-            let list = |all: &[crate::diagnose::answer::ParameterAnswer]| {
-                let one = |p: &crate::diagnose::answer::ParameterAnswer| {
-                    format!("{} {:.3e} &plusmn; {:.1e}", escape(&p.name), p.value, p.sigma)
-                };
+            let list = |all: &[ParameterAnswer]| {
+                let one = |p: &ParameterAnswer| escaped(&page::with_error(p));
                 all.iter().map(one).collect::<Vec<_>>().join("<br>")
             };
             let named = if draw.named.is_empty() { NOTHING.to_owned() } else { draw.named.join(", ") };
-            out.push_str(&format!(
-                "<tr{}><td>{}<td>{}<td>{}<td>{named}<td>{}<td>{}<td>{}<td>{:.4e}<td>{:.4e}</tr>\n",
+            let _ = writeln!(
+                page,
+                "<tr{}><td class=\"n\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td class=\"n\">{}</td>\
+                 <td class=\"n\">{}</td></tr>",
                 if draw.right { "" } else { " class=\"no\"" },
                 draw.truth.draw,
-                escape(&draw.truth.subject),
-                draw.truth.removed,
-                draw.verdict,
+                escaped(&draw.truth.subject),
+                escaped(&words(&draw.truth.removed)),
+                escaped(&words(&named)),
                 list(&draw.coefficients),
                 list(&draw.truth.coefficients),
-                draw.rms[0],
-                draw.rms[1],
-            ));
+                page::number(draw.rms[0]),
+                page::number(draw.rms[1]),
+            );
         }
-        out.push_str("</table>\n");
-        out
+        page.push_str("</tbody></table>\n");
     }
+}
+
+fn words(id: &str) -> String {
+    id.replace('_', " ")
 }
 
 fn share(good: usize, of: usize) -> String {
     if of == 0 { "-".to_owned() } else { format!("{:.1} %", 100.0 * good as f64 / of as f64) }
 }
 
-fn whole_case(whole: &Whole) -> String {
-    let answer = &whole.answer;
-    let mut out = format!("<h2>{} ({})</h2>\n", escape(&answer.case), escape(&whole.with));
-    let verdict =
-        serde_json::to_value(answer.verdict).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
-    out.push_str(&format!(
-        "<p>Verdict: <strong>{verdict}</strong>, chance of a false alarm {:.1e}.</p>\n",
-        answer.false_alarm_probability
-    ));
-    if !answer.steps.is_empty() {
-        out.push_str(&format!(
-            "<table><tr><th>added<th>rms of the fit, {0}<th>rms of data not used for the fit, {0}</tr>",
-            answer.unit
-        ));
-        for step in &answer.steps {
-            let predicted = step.predicted_rms.map_or("-".to_owned(), |p| format!("{p:.4}"));
-            out.push_str(&format!(
-                "<tr><td>{}<td>{:.4}<td>{predicted}</tr>",
-                step.added.as_deref().unwrap_or("(as it stands)"),
-                step.rms
-            ));
-        }
-        out.push_str("</table>\n");
-    }
-    out.push_str("<table><tr><th>effect<th>coefficients<th>why</tr>");
-    for effect in &answer.effects {
-        let one = |p: &crate::diagnose::answer::ParameterAnswer| {
-            format!("{} = {:.4e} &plusmn; {:.1e} {}", escape(&p.name), p.value, p.sigma, escape(&p.unit))
-        };
-        let all: Vec<String> = effect.parameters.iter().map(one).collect();
-        out.push_str(&format!("<tr><td>{}<td>{}<td>{}</tr>", effect.id, all.join("<br>"), escape(&effect.why)));
-    }
-    out.push_str("</table>\n<ul>");
-    for note in &answer.notes {
-        out.push_str(&format!("<li>{}</li>", escape(note)));
-    }
-    out.push_str("</ul>\n");
-    out
-}
-
-fn escape(text: &str) -> String {
+fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -19,7 +19,8 @@ use sha2::{Digest, Sha256};
 pub use subject::Subject;
 
 use crate::diagnose::answer::ParameterAnswer;
-use crate::diagnose::measured::{MeasuredCase, MeasuredError};
+use crate::diagnose::measured::{Kind, MeasuredCase, MeasuredError};
+use crate::ingest::wire::{Pad, PadError};
 
 /// Nothing removed.
 pub const NOTHING: &str = "nothing";
@@ -94,6 +95,14 @@ pub enum RealError {
         /// Why.
         source: std::io::Error,
     },
+    /// A PAD file.
+    #[error("{}: {source}", path.display())]
+    Pad {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: PadError,
+    },
     /// A case.
     #[error("{}: {source}", path.display())]
     Case {
@@ -122,7 +131,16 @@ pub fn read(folder: &Path, overrides: &[String]) -> Result<(MeasuredCase, BTreeM
     let case = MeasuredCase::parse(&text(folder.join("case.toml"))?, overrides).map_err(of_case)?;
     let mut files = BTreeMap::new();
     for name in case.files() {
-        let content = text(folder.join(&name))?;
+        let path = folder.join(&name);
+        let header = folder.join(format!("{name}.header"));
+        // A file with a header beside it is a PAD file: it is taken as the CSV it stands for.
+        let content = if case.kind == Kind::SeriesCsv && header.exists() {
+            let data = std::fs::read(&path).map_err(|source| RealError::Read { path: path.clone(), source })?;
+            let pad = Pad::read(&text(header)?, &data);
+            pad.map_err(|source| RealError::Pad { path, source })?.csv()
+        } else {
+            text(path)?
+        };
         files.insert(name, content);
     }
     Ok((case, files))

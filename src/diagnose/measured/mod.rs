@@ -4,6 +4,8 @@
 //! command reads them), and the windows of the accelerometer (`diagnose::case`).
 
 pub mod answer;
+mod figures;
+pub mod page;
 pub mod plates;
 pub mod spread;
 

@@ -4,6 +4,8 @@
 //! a = s T K (u - u0 - b), K = diag(1 + k), T upper triangular with the three small angles. The common scale s is a nuisance.
 
 pub mod still;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 
@@ -15,11 +17,15 @@ use crate::diagnose::measured::answer::{ArcAnswer, Effect, Fit, HeldOut, Level, 
 use crate::diagnose::measured::plates::PosesPlate;
 use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates, texts};
 
-/// Counts at zero acceleration, by the simulation.
-const ZERO_COUNTS: f64 = 32_768.0;
+/// Readings at zero acceleration that makers of triads use: none, or the middle of so many bits.
+const ZEROS: [f64; 9] = [0.0, 512.0, 2_048.0, 8_192.0, 32_768.0, 131_072.0, 524_288.0, 2_097_152.0, 8_388_608.0];
 /// Evidence needed for a term; as for orbits.
 const SCORE_MIN: f64 = 18.0;
-const POSES_MIN: usize = 14;
+/// A middle of the readings this close to nothing, in half their range, is nothing.
+const NEAR_ZERO: f64 = 0.3;
+/// Poses needed beyond the unknowns of a model that is tried.
+const SPARE_POSES: usize = 4;
+const POSES_MIN: usize = 9;
 
 /// A part of the sensor's model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -97,7 +103,7 @@ impl Triad {
     /// Value and standard error of a part's three numbers.
     pub fn values(&self, part: Part) -> [(f64, f64); 3] {
         let Some(at) = place(&self.parts, part) else { return [(0.0, 0.0); 3] };
-        let unit = if part == Part::Bias { BIAS_UNIT } else { 1.0 };
+        let unit = if part == Part::Bias { BIAS_UNIT / self.scale } else { 1.0 };
         let rows = part_rows(part);
         std::array::from_fn(|k| {
             let weights = &rows[k][..part.unknowns()];
@@ -118,8 +124,8 @@ impl Triad {
     }
 }
 
-/// Biases are solved in thousands of counts, so that all unknowns are of one order.
-const BIAS_UNIT: f64 = 1000.0;
+/// Biases are solved in m/s^2, so that all unknowns are of one order whatever the readings' unit.
+const BIAS_UNIT: f64 = 1.0;
 
 /// How a part's three numbers follow from its unknowns: the scale fractions add to nothing.
 fn part_rows(part: Part) -> [[f64; 3]; 3] {
@@ -144,9 +150,9 @@ fn acceleration(parts: &[Part], unknowns: &DVector<f64>, pose: &Pose) -> Vector3
     let bias = three(parts, unknowns, Part::Bias) * BIAS_UNIT;
     let scale = three(parts, unknowns, Part::Scale);
     let angle = three(parts, unknowns, Part::NonOrthogonality);
-    let raw = pose.mean - Vector3::repeat(ZERO_COUNTS) - bias;
+    let raw = pose.mean * unknowns[0].exp() - bias;
     // What the recording has: an axis that reads (1 + k) times the truth is divided by it.
-    let a = Vector3::from_fn(|k, _| raw[k] / (1.0 + scale[k])) * unknowns[0].exp();
+    let a = Vector3::from_fn(|k, _| raw[k] / (1.0 + scale[k]));
     Vector3::new(a.x - angle.x * a.y + angle.y * a.z, a.y - angle.z * a.z, a.z)
 }
 
@@ -201,8 +207,7 @@ impl levenberg_marquardt::LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
 
 /// Fit the common scale and the parts to the poses.
 pub fn fit(parts: &[Part], poses: &[Pose], gravity: f64) -> Triad {
-    let size: f64 =
-        poses.iter().map(|p| (p.mean - Vector3::repeat(ZERO_COUNTS)).norm()).sum::<f64>() / poses.len() as f64;
+    let size: f64 = poses.iter().map(|p| p.mean.norm()).sum::<f64>() / poses.len() as f64;
     let mut unknowns = DVector::zeros(1 + parts.iter().map(|p| p.unknowns()).sum::<usize>());
     unknowns[0] = (gravity / size).ln();
     let start = Problem { parts, poses, gravity, unknowns };
@@ -243,6 +248,9 @@ pub fn search(included: &[Part], poses: &[Pose], gravity: f64) -> Found {
         }
         for set in sets {
             let parts: Vec<Part> = now.parts.iter().chain(&set).copied().collect();
+            if poses.len() < 1 + parts.iter().map(|p| p.unknowns()).sum::<usize>() + SPARE_POSES {
+                continue;
+            }
             let score = evidence(now, &fit(&parts, poses, gravity), &set);
             if score > best.0 && (set.len() == 1 || best.0 < SCORE_MIN) {
                 best = (score, set);
@@ -263,7 +271,11 @@ pub fn search(included: &[Part], poses: &[Pose], gravity: f64) -> Found {
 fn evidence(before: &Triad, after: &Triad, set: &[Part]) -> f64 {
     let n = after.residuals.len() as f64;
     let k: usize = set.iter().map(|p| p.unknowns()).sum();
-    2.0 * n * (before.rms() / after.rms().max(1e-12)).ln() - k as f64 * n.ln()
+    // What is left of few poses after many unknowns is small by fitting alone: only the poses to spare count.
+    let free = n - after.unknowns.len() as f64;
+    let fitted = (n / free).sqrt() * after.rms().max(1e-12);
+    let bare = (n / (free + k as f64)).sqrt() * before.rms();
+    2.0 * free * (bare / fitted).ln() - k as f64 * n.ln()
 }
 
 /// Analyse a case of static poses.
@@ -299,16 +311,51 @@ pub fn poses(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Ve
     let name = case.text("recording.file")?;
     let columns = texts(&case.table, "recording.columns");
     let rows = still::read(&name, &files[&name], columns.as_deref())?;
-    let poses = find_poses(&rows);
+    let mut poses = find_poses(&rows);
+    let zero = zero(case, &poses)?;
+    for pose in &mut poses {
+        pose.mean -= Vector3::repeat(zero);
+    }
     if poses.len() < POSES_MIN {
         return Err(MeasuredError::TooFew { what: "static poses", found: poses.len(), expected: POSES_MIN });
     }
     Ok(poses)
 }
 
-fn effect(fit: &Triad, part: Part, score: f64, was: f64) -> Effect {
+/// The reading at zero acceleration that the simulation takes: what the case says, or the usual one nearest to the middle
+/// of what was read.
+fn zero(case: &MeasuredCase, poses: &[Pose]) -> Result<f64, MeasuredError> {
+    if let Some(zero) = case.number("recording.zero_counts")? {
+        return Ok(zero);
+    }
+    let range = |axis: usize| {
+        poses
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.mean[axis]), h.max(p.mean[axis])))
+    };
+    let middle = (0..3).map(range).map(|(low, high)| 0.5 * (low + high)).sum::<f64>() / 3.0;
+    let half = (0..3).map(range).map(|(low, high)| 0.5 * (high - low)).fold(0.0, f64::max);
+    // Readings on both sides of nothing have it as their zero.
+    if middle.abs() < NEAR_ZERO * half {
+        return Ok(0.0);
+    }
+    Ok(ZEROS.into_iter().min_by(|a, b| (a - middle).abs().total_cmp(&(b - middle).abs())).unwrap_or(0.0))
+}
+
+/// Unit of the readings, by the names of their columns.
+fn unit(case: &MeasuredCase) -> String {
+    let columns = texts(&case.table, "recording.columns").unwrap_or_default();
+    let named = columns.iter().find_map(|c| c.strip_prefix("x_")).unwrap_or("counts");
+    match named {
+        "m_s2" => "m/s^2".to_owned(),
+        other => other.to_owned(),
+    }
+}
+
+fn effect(case: &MeasuredCase, fit: &Triad, part: Part, score: f64, was: f64) -> Effect {
     let values = fit.values(part);
-    let parameters = (0..3).map(|k| parameter(part.names()[k], values[k].0, values[k].1, part.unit())).collect();
+    let unit = if part == Part::Bias { unit(case) } else { part.unit().to_owned() };
+    let parameters = (0..3).map(|k| parameter(part.names()[k], values[k].0, values[k].1, &unit)).collect();
     let largest = (0..3).max_by(|a, b| values[*a].0.abs().total_cmp(&values[*b].0.abs())).unwrap_or(0);
     let extra = match part {
         Part::Bias => format!(" In m/s^2 its largest is {:.4}.", values[largest].0 * fit.scale),
@@ -332,7 +379,7 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
     };
     let mut effects = Vec::new();
     for (i, (part, score)) in found.added.iter().enumerate() {
-        let mut one = effect(last, *part, *score, found.fits[i].rms());
+        let mut one = effect(case, last, *part, *score, found.fits[i].rms());
         one.rms = vec![found.fits[i + 1].rms()];
         effects.push(one);
     }
@@ -383,7 +430,7 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
         arcs: vec![arc],
         steps: found.fits.iter().enumerate().map(step).collect(),
         notes: vec![format!(
-            "{} static poses were found; the common scale is estimated with every model.",
+            "{} static poses were found (a pose that was knocked and lay as before counts once); the common scale is estimated with every model.",
             poses.len()
         )],
     }

@@ -13,6 +13,10 @@ const MARGIN_S: f64 = 0.3;
 /// A window this many times noisier than the quiet ones is not still. Scatter of a hundred readings varies by 10 %.
 const QUIET_FACTOR: f64 = 2.0;
 
+/// A pose that was knocked is still again within this, s, with its mean where it was to so many scatters of one reading.
+const KNOCK_S: f64 = 2.0;
+const KNOCK_SCATTERS: f64 = 1.5;
+
 /// One reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row {
@@ -35,15 +39,19 @@ pub struct Pose {
     pub scatter: f64,
 }
 
-/// Read columns of numbers separated by blanks or commas; `columns` names them (t_s, x_counts, y_counts, z_counts).
+/// Read columns of numbers separated by blanks or commas; `columns` names them: a time and three axes, such as
+/// `t_s, x_counts, y_counts, z_counts` (what follows the first letter is the unit).
 pub fn read(file: &str, text: &str, columns: Option<&[String]>) -> Result<Vec<Row>, MeasuredError> {
-    let place = |name: &str, default: usize| columns.map_or(Some(default), |c| c.iter().position(|n| n == name));
-    let places = [place("t_s", 0), place("x_counts", 1), place("y_counts", 2), place("z_counts", 3)];
+    let place = |letter: &str, default: usize| match columns {
+        None => Some(default),
+        Some(names) => names.iter().position(|n| n == letter || n.starts_with(&format!("{letter}_"))),
+    };
+    let places = [place("t", 0), place("x", 1), place("y", 2), place("z", 3)];
     let [Some(t), Some(x), Some(y), Some(z)] = places else {
         return Err(MeasuredError::Key {
             key: "recording.columns".to_owned(),
-            expected: "t_s, x_counts, y_counts and z_counts among them",
-            found: format!("{columns:?}"),
+            expected: "a time and three axes among them, such as t_s, x_counts, y_counts and z_counts",
+            found: format!("{:?}", columns.unwrap_or_default()),
         });
     };
     let mut rows = Vec::new();
@@ -81,6 +89,9 @@ pub fn find_poses(rows: &[Row]) -> Vec<Pose> {
         return Vec::new();
     }
     let step_s = (rows[rows.len() - 1].t_s - rows[0].t_s) / (rows.len() - 1) as f64;
+    if step_s <= 0.0 {
+        return Vec::new();
+    }
     let window = ((WINDOW_S / step_s).round() as usize).clamp(8, rows.len());
     let scatters = rolling_scatter(rows, window);
     let mut sorted = scatters.clone();
@@ -89,7 +100,7 @@ pub fn find_poses(rows: &[Row]) -> Vec<Pose> {
     let quiet = sorted[sorted.len() / 10] * QUIET_FACTOR;
     let margin = (MARGIN_S / step_s).round() as usize;
     let least = (POSE_S_MIN / step_s).round() as usize;
-    let mut poses = Vec::new();
+    let mut stretches: Vec<(usize, usize)> = Vec::new();
     let mut start: Option<usize> = None;
     for i in 0..=scatters.len() {
         let still = scatters.get(i).is_some_and(|s| *s <= quiet);
@@ -98,14 +109,34 @@ pub fn find_poses(rows: &[Row]) -> Vec<Pose> {
             (false, Some(from)) => {
                 let end = i - 1 + window;
                 if end - from >= least + 2 * margin {
-                    poses.push(pose(&rows[from + margin..end - margin]));
+                    stretches.push((from + margin, end - margin));
                 }
                 start = None;
             }
             _ => {}
         }
     }
-    poses
+    joined(rows, stretches)
+}
+
+/// Stretches to poses. Two that follow each other closely with the same mean are one pose that was knocked.
+fn joined(rows: &[Row], stretches: Vec<(usize, usize)>) -> Vec<Pose> {
+    let mut poses: Vec<(Vec<Row>, Pose)> = Vec::new();
+    for (from, to) in stretches {
+        let own = pose(&rows[from..to]);
+        if let Some((members, last)) = poses.last_mut() {
+            let near = own.start_s - last.end_s < KNOCK_S;
+            let moved = (own.mean - last.mean).amax();
+            if near && moved < KNOCK_SCATTERS * 0.5 * (own.scatter + last.scatter) {
+                let after = rows[from..to].iter().filter(|row| row.t_s > last.end_s);
+                members.extend(after);
+                *last = pose(members);
+                continue;
+            }
+        }
+        poses.push((rows[from..to].to_vec(), own));
+    }
+    poses.into_iter().map(|(_, pose)| pose).collect()
 }
 
 /// Scatter (one axis, counts) of each window of readings.

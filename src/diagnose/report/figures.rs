@@ -6,24 +6,24 @@ use plotters::prelude::*;
 use super::Plates;
 use super::reduce::{Bin, amplitudes, binned, range, rms, runs, spans};
 
-type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<String, String>;
+pub(in crate::diagnose) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(in crate::diagnose) type Drawn = Result<String, String>;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 const WIDTH: u32 = 980;
-const GREY: RGBColor = RGBColor(140, 140, 140);
-const INK: RGBColor = RGBColor(40, 40, 40);
-const CLAIM: RGBColor = RGBColor(178, 58, 46);
-const AFTER: RGBColor = RGBColor(38, 84, 124);
+pub(in crate::diagnose) const GREY: RGBColor = RGBColor(140, 140, 140);
+pub(in crate::diagnose) const INK: RGBColor = RGBColor(40, 40, 40);
+pub(in crate::diagnose) const CLAIM: RGBColor = RGBColor(178, 58, 46);
+pub(in crate::diagnose) const AFTER: RGBColor = RGBColor(38, 84, 124);
 const SHADOW: RGBAColor = RGBAColor(70, 90, 130, 0.10);
 /// Mean that a point of a time line stands for, s.
 const LINE_S: f64 = 600.0;
 
-fn text(size: u32) -> TextStyle<'static> {
+pub(in crate::diagnose) fn text(size: u32) -> TextStyle<'static> {
     TextStyle::from(("Helvetica, Arial, sans-serif", size).into_font()).color(&INK)
 }
 
-fn on_canvas(height: u32, draw: impl FnOnce(&Canvas) -> Result<(), String>) -> Drawn {
+pub(in crate::diagnose) fn on_canvas(height: u32, draw: impl FnOnce(&Canvas) -> Result<(), String>) -> Drawn {
     let mut svg = String::new();
     {
         let canvas = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
@@ -34,7 +34,7 @@ fn on_canvas(height: u32, draw: impl FnOnce(&Canvas) -> Result<(), String>) -> D
     Ok(svg)
 }
 
-fn said(error: impl std::fmt::Display) -> String {
+pub(in crate::diagnose) fn said(error: impl std::fmt::Display) -> String {
     error.to_string()
 }
 

@@ -2,10 +2,10 @@
 //!
 //! A figure gets numbers and gives text; nothing here computes what the answer is, and nothing writes a file.
 
-mod figures;
-mod page;
+pub(in crate::diagnose) mod figures;
+pub(in crate::diagnose) mod page;
 mod reduce;
-mod sentence;
+pub(in crate::diagnose) mod sentence;
 
 pub use sentence::sentence;
 

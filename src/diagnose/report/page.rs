@@ -6,7 +6,7 @@ use super::Plates;
 use super::sentence::{figure, sentence, words};
 use crate::diagnose::answer::{Diagnosis, EffectAnswer, Verdict};
 
-const STYLE: &str = "
+pub(in crate::diagnose) const STYLE: &str = "
 :root { --ink: #222; --soft: #666; --rule: #d5d5d5; --claim: #b23a2e; }
 * { box-sizing: border-box; }
 body { font: 15px/1.5 Georgia, 'Times New Roman', serif; color: var(--ink); max-width: 1020px; margin: 2.2em auto; padding: 0 1.2em; }
@@ -94,7 +94,7 @@ pub fn page(d: &Diagnosis, plates: &Plates, figures: &[(&'static str, String)], 
     page
 }
 
-fn verdict_word(verdict: Verdict) -> &'static str {
+pub(in crate::diagnose) fn verdict_word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Consistent => "consistent",
         Verdict::Explained => "explained",
@@ -114,11 +114,11 @@ fn under(d: &Diagnosis, plates: &Plates) -> String {
     line
 }
 
-fn probability(p: f64) -> String {
+pub(in crate::diagnose) fn probability(p: f64) -> String {
     if p <= 0.0 || p >= 1e-3 { format!("{p:.3}") } else { format!("{p:.0e}") }
 }
 
-fn figure_of(page: &mut String, figures: &[(&'static str, String)], name: &str, caption: &str) {
+pub(in crate::diagnose) fn figure_of(page: &mut String, figures: &[(&'static str, String)], name: &str, caption: &str) {
     let Some((_, svg)) = figures.iter().find(|(n, _)| *n == name) else { return };
     // plotters writes width and height; the page scales by a view box.
     let svg = with_view_box(svg);
@@ -138,7 +138,7 @@ fn with_view_box(svg: &str) -> String {
     }
 }
 
-fn table(page: &mut String, head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) {
+pub(in crate::diagnose) fn table(page: &mut String, head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) {
     page.push_str("<table><thead><tr>");
     for (k, cell) in head.iter().enumerate() {
         let _ = write!(page, "<th{}>{}</th>", class(k, head), escaped(cell.trim_start_matches('#')));
@@ -197,7 +197,7 @@ fn rms(effect: &EffectAnswer) -> String {
 }
 
 /// Value and error to the error's second digit.
-pub fn with_error(value: f64, sigma: f64) -> (String, String) {
+pub(in crate::diagnose) fn with_error(value: f64, sigma: f64) -> (String, String) {
     if sigma <= 0.0 || !sigma.is_finite() {
         return (figure(value), String::new());
     }
@@ -319,6 +319,6 @@ fn notes(page: &mut String, d: &Diagnosis, missing: &[String]) {
     page.push_str("</ul>\n");
 }
 
-fn escaped(text: &str) -> String {
+pub(in crate::diagnose) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,0 +1,233 @@
+//! The figures of these cases as SVG texts: grey for what was, blue for what is left, red for what cannot be explained.
+
+use plotters::prelude::*;
+
+use super::plates::{OrbitPlate, Plates, PosesPlate, SeriesPlate};
+use super::spread::median;
+use crate::diagnose::report::figures::{AFTER, CLAIM, Drawn, GREY, INK, on_canvas, said, text};
+
+/// File name, caption and drawing of each figure of a case; what has nothing to show is left out.
+pub fn all(plates: &Plates) -> Vec<(&'static str, &'static str, Drawn)> {
+    match plates {
+        Plates::Series(axes) => vec![(
+            "series.svg",
+            "Recording less simulation, block means: before (grey) and with what is named taken away (blue). Controls, in which \
+             nothing is expected, stand last.",
+            series(axes),
+        )],
+        Plates::Orbit(plate) => vec![
+            (
+                "ladder.svg",
+                "3-D residual of every arc, level by level: each line a satellite, the median in blue; above the dashed line \
+                 an arc is called unexplained.",
+                ladder(plate),
+            ),
+            (
+                "arcs.svg",
+                "3-D residual of each satellite as the simulation stands (grey) and with everything named (blue; red where it \
+                 stays unexplained).",
+                arcs(plate),
+            ),
+        ],
+        Plates::Poses(plate) => vec![(
+            "poses.svg",
+            "Size of |a| - g in every pose: by the ideal triad (grey), with everything named (blue).",
+            poses(plate),
+        )],
+    }
+}
+
+fn series(axes: &[SeriesPlate]) -> Drawn {
+    const PANEL: u32 = 120;
+    on_canvas(PANEL * axes.len() as u32 + 26, |canvas| {
+        let panels = canvas.split_evenly((axes.len(), 1));
+        for (k, (axis, panel)) in axes.iter().zip(&panels).enumerate() {
+            let high = axis.before.iter().chain(&axis.after).map(|v| v.abs()).fold(1e-300, f64::max) * 1.1;
+            let hours = |t: f64| t / 3600.0;
+            let (first, last) = (hours(axis.t_s[0]), hours(axis.t_s[axis.t_s.len() - 1]));
+            // Units of a power of ten that keeps labels short.
+            let power = (high.log10().floor() as i32).div_euclid(3) * 3;
+            let scale = 10f64.powi(-power);
+            let name = if power == 0 { axis.unit.clone() } else { format!("1e{power} {}", axis.unit) };
+            let mut chart = ChartBuilder::on(panel)
+                .margin_top(8)
+                .margin_right(14)
+                .x_label_area_size(if k + 1 == axes.len() { 34 } else { 6 })
+                .y_label_area_size(74)
+                .build_cartesian_2d(first..last, -high * scale..high * scale)
+                .map_err(said)?;
+            let mut mesh = chart.configure_mesh();
+            mesh.disable_x_mesh().light_line_style(TRANSPARENT).bold_line_style(GREY.mix(0.25)).axis_style(GREY);
+            mesh.y_labels(3).axis_desc_style(text(12)).label_style(text(11)).y_desc(name);
+            mesh.x_labels(if k + 1 == axes.len() { 10 } else { 0 });
+            if k + 1 == axes.len() {
+                mesh.x_desc("hours after the first row");
+            }
+            mesh.draw().map_err(said)?;
+            let points = |y: &[f64]| -> Vec<(f64, f64)> {
+                axis.t_s.iter().zip(y).map(|(t, y)| (hours(*t), y * scale)).collect()
+            };
+            let dots = |y: &[f64], colour: RGBColor| points(y).into_iter().map(move |p| Circle::new(p, 1, colour.filled()));
+            chart.draw_series(dots(&axis.before, GREY)).map_err(said)?;
+            if axis.after != axis.before {
+                chart.draw_series(dots(&axis.after, AFTER)).map_err(said)?;
+            }
+            let control = if axis.control { " (control)" } else { "" };
+            panel.draw(&Text::new(format!("{}{control}", axis.name), (84, 10), text(13))).map_err(said)?;
+        }
+        Ok(())
+    })
+}
+
+/// The powers of ten that hold all positive values.
+fn decades(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values
+        .into_iter()
+        .filter(|v| *v > 0.0 && v.is_finite())
+        .fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(v), h.max(v)));
+    if high > 0.0 { (low.log10().floor(), high.log10().ceil().max(low.log10().floor() + 1.0)) } else { (-3.0, 0.0) }
+}
+
+fn label(power: f64) -> String {
+    match power.round() as i32 {
+        p if (power - power.round()).abs() > 0.01 || p > 4 => String::new(),
+        p if p >= 0 => format!("{:.0}", 10f64.powi(p)),
+        p => format!("{:.*}", p.unsigned_abs() as usize, 10f64.powi(p)),
+    }
+}
+
+fn words(id: &str) -> String {
+    id.replace("solar_radiation_pressure", "solar radiation").replace("_bias", " bias").replace('_', " ")
+}
+
+fn ladder(plate: &OrbitPlate) -> Drawn {
+    on_canvas(360, |canvas| {
+        let (low, high) = decades(plate.rms_m.iter().flatten().copied().chain([plate.rms_max_m]));
+        let levels = plate.rms_m.len();
+        let mut chart = ChartBuilder::on(canvas)
+            .margin(10)
+            .x_label_area_size(34)
+            .y_label_area_size(70)
+            .build_cartesian_2d(-0.25..levels as f64 - 0.75, low..high)
+            .map_err(said)?;
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(GREY.mix(0.25))
+            .axis_style(GREY)
+            .x_labels(levels * 4)
+            .y_labels((high - low) as usize + 1)
+            .y_desc("3-D rms, m")
+            .axis_desc_style(text(14))
+            .label_style(text(12))
+            .y_label_formatter(&|y| label(*y))
+            .x_label_formatter(&|x| match plate.added.get(x.round() as usize) {
+                Some(added) if (x - x.round()).abs() < 1e-6 && *x > -0.01 => words(added),
+                _ => String::new(),
+            })
+            .draw()
+            .map_err(said)?;
+        for arc in 0..plate.arcs.len() {
+            let odd = plate.rms_m[levels - 1][arc] > plate.rms_max_m;
+            let line = (0..levels).map(|k| (k as f64, plate.rms_m[k][arc].max(1e-6).log10()));
+            let colour = if odd { CLAIM.stroke_width(2) } else { GREY.mix(0.5).stroke_width(1) };
+            chart.draw_series(LineSeries::new(line, colour)).map_err(said)?;
+            if odd {
+                let end = (levels as f64 - 0.97, plate.rms_m[levels - 1][arc].log10());
+                chart
+                    .draw_series([Text::new(plate.arcs[arc].clone(), end, text(12).color(&CLAIM))])
+                    .map_err(said)?;
+            }
+        }
+        let middle = |k: usize| median(plate.rms_m[k].iter().copied()).max(1e-6).log10();
+        chart
+            .draw_series(LineSeries::new((0..levels).map(|k| (k as f64, middle(k))), AFTER.stroke_width(3)))
+            .map_err(said)?;
+        let limit = plate.rms_max_m.log10();
+        let dashes = DashedLineSeries::new([(-0.25, limit), (levels as f64 - 0.75, limit)], 6, 5, INK.into());
+        chart.draw_series(dashes).map_err(said)?;
+        Ok(())
+    })
+}
+
+fn arcs(plate: &OrbitPlate) -> Drawn {
+    let (Some(first), Some(last)) = (plate.rms_m.first(), plate.rms_m.last()) else { return Ok(String::new()) };
+    on_canvas(300, |canvas| {
+        let (low, high) = decades(first.iter().chain(last).copied().chain([plate.rms_max_m]));
+        let n = plate.arcs.len();
+        let every = n.div_ceil(34).max(1);
+        let mut chart = ChartBuilder::on(canvas)
+            .margin(10)
+            .x_label_area_size(28)
+            .y_label_area_size(70)
+            .build_cartesian_2d(-1.0..n as f64, low..high)
+            .map_err(said)?;
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(GREY.mix(0.25))
+            .axis_style(GREY)
+            .x_labels(0)
+            .y_labels((high - low) as usize + 1)
+            .y_desc("3-D rms, m")
+            .axis_desc_style(text(14))
+            .label_style(text(12))
+            .y_label_formatter(&|y| label(*y))
+            .draw()
+            .map_err(said)?;
+        for k in 0..n {
+            let x = k as f64;
+            let (was, is) = (first[k].max(1e-6).log10(), last[k].max(1e-6).log10());
+            let colour = if last[k] > plate.rms_max_m { CLAIM } else { AFTER };
+            chart
+                .draw_series(LineSeries::new([(x, was), (x, is)], GREY.mix(0.4).stroke_width(1)))
+                .map_err(said)?;
+            chart.draw_series([Circle::new((x, was), 3, GREY.filled())]).map_err(said)?;
+            chart.draw_series([Circle::new((x, is), 4, colour.filled())]).map_err(said)?;
+            if k % every == 0 {
+                let (px, py) = chart.backend_coord(&(x, low));
+                canvas.draw(&Text::new(plate.arcs[k].clone(), (px - 11, py + 7), text(11))).map_err(said)?;
+            }
+        }
+        let limit = plate.rms_max_m.log10();
+        let dashes = DashedLineSeries::new([(-1.0, limit), (n as f64, limit)], 6, 5, INK.into());
+        chart.draw_series(dashes).map_err(said)?;
+        Ok(())
+    })
+}
+
+fn poses(plate: &PosesPlate) -> Drawn {
+    let (Some(first), Some(last)) = (plate.residuals.first(), plate.residuals.last()) else { return Ok(String::new()) };
+    on_canvas(280, |canvas| {
+        let (low, high) = decades(first.iter().chain(last).map(|r| r.abs()));
+        let low = low.max(high - 6.0);
+        let mut chart = ChartBuilder::on(canvas)
+            .margin(10)
+            .x_label_area_size(34)
+            .y_label_area_size(76)
+            .build_cartesian_2d(0.0..first.len() as f64 + 1.0, low..high)
+            .map_err(said)?;
+        chart
+            .configure_mesh()
+            .disable_x_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(GREY.mix(0.25))
+            .axis_style(GREY)
+            .y_labels((high - low) as usize + 1)
+            .y_desc("| |a| - g |, m/s²")
+            .x_desc("pose")
+            .axis_desc_style(text(14))
+            .label_style(text(12))
+            .x_label_formatter(&|x| format!("{x:.0}"))
+            .y_label_formatter(&|y| label(*y))
+            .draw()
+            .map_err(said)?;
+        for (values, colour) in [(first, GREY), (last, AFTER)] {
+            let at = values.iter().enumerate().map(|(i, r)| ((i + 1) as f64, r.abs().log10().max(low)));
+            chart.draw_series(at.map(|p| Circle::new(p, 4, colour.filled()))).map_err(said)?;
+        }
+        Ok(())
+    })
+}

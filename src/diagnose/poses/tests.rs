@@ -1,0 +1,175 @@
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha12Rng;
+
+use super::*;
+
+const G: f64 = 9.80665;
+
+fn normal(rng: &mut ChaCha12Rng) -> f64 {
+    (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
+}
+
+/// A triad: zero reading, readings to 1 m/s^2, bias (readings), scale fractions, three angles.
+struct Truth {
+    zero: f64,
+    per_m_s2: f64,
+    bias: Vector3<f64>,
+    scale: Vector3<f64>,
+    angle: Vector3<f64>,
+}
+
+impl Truth {
+    fn ideal(zero: f64, per_m_s2: f64) -> Self {
+        Self { zero, per_m_s2, bias: Vector3::zeros(), scale: Vector3::zeros(), angle: Vector3::zeros() }
+    }
+
+    /// What a triad of this kind reads: the inverse of the model, solved from the last axis up.
+    fn reading(&self, a: &Vector3<f64>) -> Vector3<f64> {
+        let z = a.z;
+        let y = a.y + self.angle.z * z;
+        let x = a.x + self.angle.x * y - self.angle.y * z;
+        let own = Vector3::new(x, y, z).component_mul(&(Vector3::repeat(1.0) + self.scale));
+        own * self.per_m_s2 + self.bias + Vector3::repeat(self.zero)
+    }
+
+    /// Rows at 50 Hz: poses of four seconds in random directions, turned by hand in between.
+    fn rows(&self, poses: usize, noise_m_s2: f64, rng: &mut ChaCha12Rng) -> String {
+        let mut text = String::new();
+        let mut t = 0.0;
+        for _ in 0..poses {
+            let down = Vector3::new(normal(rng), normal(rng), normal(rng)).normalize() * G;
+            for i in 0..300 {
+                let held = if i < 200 { 0.0 } else { 2.0 };
+                let shake = Vector3::new(normal(rng), normal(rng), normal(rng)) * (noise_m_s2 + held);
+                let r = self.reading(&(down + shake));
+                text.push_str(&format!("{t:.3} {:.6} {:.6} {:.6}\n", r.x, r.y, r.z));
+                t += 0.02;
+            }
+        }
+        text
+    }
+}
+
+fn diagnosed(text: String, unit: &str) -> Answer {
+    let case = format!(
+        "[case]\nid = \"made\"\n[simulation]\nincludes = [\"ideal_triad\"]\n[recording]\nkind = \"static_poses\"\nfile = \"a.txt\"\n\
+         columns = [\"t_s\", \"x_{unit}\", \"y_{unit}\", \"z_{unit}\"]\ngravity_m_s2 = {G}\n"
+    );
+    let case = MeasuredCase::parse(&case, &[]).expect("a case");
+    let files = BTreeMap::from([("a.txt".to_owned(), text)]);
+    diagnose(&case, &files).expect("an answer").0
+}
+
+#[test]
+fn an_ideal_triad_lacks_nothing_whatever_its_unit() {
+    for (seed, (zero, per, unit)) in
+        [(0.0, 1.0, "m_s2"), (0.0, 1.0 / G, "g"), (32_768.0, 400.0, "counts"), (2_048.0, 20.0, "counts"), (0.0, 1670.0, "lsb")]
+            .into_iter()
+            .enumerate()
+    {
+        let mut rng = ChaCha12Rng::seed_from_u64(seed as u64);
+        let answer = diagnosed(Truth::ideal(zero, per).rows(24, 0.01, &mut rng), unit);
+        assert_eq!((answer.verdict, answer.effects.len()), (Verdict::Consistent, 0), "{unit}");
+        assert_eq!(answer.arcs[0].fitted, 24);
+    }
+}
+
+#[test]
+fn poses_of_an_ideal_triad_raise_no_false_alarm() {
+    let seeds = if cfg!(feature = "slow") { 1_000 } else { 150 };
+    let mut alarms = 0;
+    for seed in 0..seeds {
+        let mut rng = ChaCha12Rng::seed_from_u64(seed);
+        let n = 10 + (seed as usize % 5) * 8;
+        let poses: Vec<Pose> = (0..n)
+            .map(|i| {
+                let down = Vector3::new(normal(&mut rng), normal(&mut rng), normal(&mut rng)).normalize() * G;
+                let off = Vector3::new(normal(&mut rng), normal(&mut rng), normal(&mut rng)) * 1e-3;
+                Pose { start_s: i as f64, end_s: i as f64 + 0.5, mean: (down + off) * 400.0, scatter: 4.0 }
+            })
+            .collect();
+        alarms += u64::from(!search(&[], &poses, G).added.is_empty());
+    }
+    println!("{alarms} false alarms in {seeds} sets of poses");
+    assert!(alarms * 100 <= seeds, "{alarms} of {seeds}");
+}
+
+#[test]
+fn what_a_triad_of_another_kind_lacks_is_found_with_errors_that_hold() {
+    let (mut named, mut within, mut compared) = (0, 0, 0);
+    for seed in 0..20 {
+        let mut rng = ChaCha12Rng::seed_from_u64(seed);
+        let small = |rng: &mut ChaCha12Rng, size: f64| Vector3::new(normal(rng), normal(rng), normal(rng)) * size;
+        let mut truth = Truth::ideal(0.0, 1.0 / G);
+        truth.bias = small(&mut rng, 0.02);
+        truth.scale = small(&mut rng, 0.01);
+        truth.scale -= Vector3::repeat(truth.scale.mean());
+        truth.angle = small(&mut rng, 0.01);
+        let answer = diagnosed(truth.rows(26, 0.01, &mut rng), "g");
+        let mut ids: Vec<&str> = answer.effects.iter().map(|e| e.id.as_str()).collect();
+        ids.sort_unstable();
+        named += usize::from(ids == ["bias", "non_orthogonality", "scale_factor"]);
+        assert!(answer.fit.after.rms_total < 0.002, "{}", answer.fit.after.rms_total);
+        for effect in &answer.effects {
+            let true_values = match effect.id.as_str() {
+                "bias" => truth.bias,
+                "scale_factor" => truth.scale,
+                _ => truth.angle,
+            };
+            for (p, is) in effect.parameters.iter().zip(true_values.iter()) {
+                compared += 1;
+                within += usize::from((p.value - is).abs() < 2.0 * p.sigma);
+            }
+        }
+    }
+    println!("{named} of 20 triads named whole, {within} of {compared} coefficients within two standard errors");
+    // Products of small numbers are not in the model; 95 % of 180, less three standard deviations.
+    assert!(named >= 18 && 10 * within >= 9 * compared, "{named}, {within} of {compared}");
+}
+
+#[test]
+fn a_pose_that_was_knocked_counts_once() {
+    let mut rng = ChaCha12Rng::seed_from_u64(3);
+    let text = Truth::ideal(32_768.0, 400.0).rows(12, 0.01, &mut rng);
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    // Row 95 of each pose's two hundred still ones; four seconds are too short to be cut: the fifth is made longer.
+    let still = lines[1_200..1_400].to_vec();
+    lines.splice(1_400..1_400, still);
+    let times: Vec<f64> = (0..lines.len()).map(|i| 0.02 * i as f64).collect();
+    for (line, t) in lines.iter_mut().zip(times) {
+        let rest = line.split_once(' ').map(|(_, r)| r.to_owned()).unwrap_or_default();
+        *line = format!("{t:.3} {rest}");
+    }
+    for line in &mut lines[1_398..1_402] {
+        let (t, _) = line.split_once(' ').unwrap_or_default();
+        *line = format!("{t} 30000 36000 31000");
+    }
+    let answer = diagnosed(lines.join("\n"), "counts");
+    assert_eq!(answer.arcs[0].fitted, 12);
+}
+
+#[test]
+fn what_cannot_be_used_is_told_in_one_sentence() {
+    let case = |columns: &str, more: &str| {
+        let text = format!(
+            "[recording]\nkind = \"static_poses\"\nfile = \"a.txt\"\ncolumns = [{columns}]\n{more}\n[simulation]\nincludes = []\n"
+        );
+        MeasuredCase::parse(&text, &[]).expect("a case")
+    };
+    let said = |case: MeasuredCase, text: &str| {
+        let files = BTreeMap::from([("a.txt".to_owned(), text.to_owned())]);
+        diagnose(&case, &files).expect_err("an error").to_string()
+    };
+    let good = "\"t_s\",\"x_g\",\"y_g\",\"z_g\"";
+    assert!(said(case(good, ""), "").starts_with("case.toml: `recording.gravity_m_s2`: expected a number"));
+    assert!(said(case("\"t_s\",\"x_g\"", "gravity_m_s2 = 9.8"), "").contains("expected a time and three axes"));
+    assert_eq!(
+        said(case(good, "gravity_m_s2 = 9.8"), "0 1 2 3\n1 2 tea 4\n"),
+        "a.txt, line 2: expected a time and three counts, found \"1 2 tea 4\""
+    );
+    assert_eq!(
+        said(case(good, "gravity_m_s2 = 9.8"), "0 1 2 3\n"),
+        "the recording holds 0 usable static poses, expected at least 9"
+    );
+}
