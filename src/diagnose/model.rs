@@ -176,7 +176,7 @@ fn joint_covariance(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) 
 fn entry_columns(scene: &Scene, entry: &Entry, theta: &super::catalogue::Theta) -> Option<Vec<super::design::Raw>> {
     match entry.family {
         Family::Listed(effect) => (effect.signature)(scene, theta).map(|s| s.columns()),
-        Family::Open(_) => Some(entry.points[0].1.columns()),
+        Family::Open(_) => entry.points.get(theta[0] as usize).map(|(_, shape)| shape.columns()),
     }
 }
 

@@ -20,6 +20,14 @@ const BEAM: usize = 4;
 /// Sets weighed each with its own noise.
 const FINALISTS: usize = 10;
 
+/// Log prior odds of every member beyond the second: three things left out at once are rarer than their odds one by one say,
+/// and three effects together imitate nearly anything.
+const CROWD: f64 = -4.0;
+
+fn crowd(members: usize) -> f64 {
+    CROWD * members.saturating_sub(2) as f64
+}
+
 /// What a family is.
 #[derive(Clone, Copy)]
 pub enum Family {
@@ -61,15 +69,16 @@ impl Entry {
 
     /// An open form.
     pub fn open(index: usize, atom: &Atom, log_prior: f64) -> Self {
-        let sizes = vec![
-            super::open_form::SIZE_NG;
-            if matches!(atom.shape, Shape::Scalar(_)) { 3 } else { atom.shape.columns().len() }
-        ];
+        let count = match &atom.forms[0].shape {
+            Shape::Columns(columns) => columns.len(),
+            _ => 3,
+        };
+        let sizes = vec![super::open_form::SIZE_NG; count];
         Self {
             family: Family::Open(index),
             log_prior,
             log_volume: 0.0,
-            points: vec![([0.0; 2], atom.shape.clone())],
+            points: atom.forms.iter().enumerate().map(|(i, f)| ([i as f64, 0.0], f.shape.clone())).collect(),
             sizes,
         }
     }
@@ -161,7 +170,7 @@ impl Set {
     /// Log evidence and priors at the noise of the frame.
     pub fn weigh(&mut self, frame: &Frame, entries: &[Entry]) {
         let priors: f64 = self.members.iter().map(|m| entries[m.entry].log_prior + m.log_occam).sum();
-        self.score = self.chosen(frame).log_evidence + priors;
+        self.score = self.chosen(frame).log_evidence + priors + crowd(self.members.len());
     }
 
     /// Whiten the members again for another noise.
@@ -224,7 +233,7 @@ fn member_sizes(m: &Member, entries: &[Entry]) -> Vec<f64> {
 fn shape_at(scene: &Scene, entry: &Entry, theta: &Theta) -> Option<Shape> {
     match entry.effect() {
         Some(effect) => (effect.signature)(scene, theta),
-        None => Some(entry.points[0].1.clone()),
+        None => entry.points.get(theta[0] as usize).map(|(_, shape)| shape.clone()),
     }
 }
 
@@ -243,37 +252,25 @@ fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, theta: &Theta, axis: Op
 /// The best way to add one entry to a chosen set: the score gained with priors, and the member.
 pub fn best_of_entry(bank: &Bank, index: usize, chosen: &Chosen) -> (f64, Member) {
     let entry = &bank.entries[index];
-    let gains: Vec<f64> = bank.points[index]
-        .iter()
-        .map(|p| if p.fixed { chosen.gain_fixed(&p.columns[0]) } else { chosen.gain(&p.columns) })
-        .collect();
-    let best = (0..gains.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b])).unwrap_or(0);
-    let top = gains[best];
-    let marginal = top + gains.iter().map(|g| (g - top).exp()).sum::<f64>().ln() - (gains.len() as f64).ln();
-    let mut member = Member {
-        entry: index,
-        axis: None,
-        theta: bank.points[index][best].theta,
-        log_occam: marginal - top,
-        theta_sigma: [0.0; 2],
-        point: bank.points[index][best].clone(),
-    };
-    let mut gain = marginal;
-    if matches!(entry.family, Family::Open(_)) && matches!(entry.points[0].1, Shape::Scalar(_)) {
-        // All axes, or one of them: a quarter each.
-        let fourth = 4.0_f64.ln();
-        gain -= fourth;
-        member.log_occam -= fourth;
-        for axis in 0..3 {
-            let single = chosen.gain(&bank.points[index][0].columns[axis..=axis]) - fourth;
-            if single > gain {
-                gain = single;
-                member.axis = Some(axis);
-                member.point.columns = vec![bank.points[index][0].columns[axis].clone()];
-            }
+    let points = &bank.points[index];
+    // An open form of one series acts on all axes or on one of them: a quarter each.
+    let narrow = matches!((entry.family, &entry.points[0].1), (Family::Open(_), Shape::Scalar(_)));
+    let mut ways: Vec<(f64, usize, Option<usize>)> = Vec::with_capacity(points.len() * if narrow { 4 } else { 1 });
+    for (i, p) in points.iter().enumerate() {
+        ways.push((if p.fixed { chosen.gain_fixed(&p.columns[0]) } else { chosen.gain(&p.columns) }, i, None));
+        if narrow {
+            ways.extend((0..3).map(|axis| (chosen.gain(&p.columns[axis..=axis]), i, Some(axis))));
         }
     }
-    (gain + entry.log_prior, member)
+    let (top, best, axis) = ways.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::MIN, 0, None));
+    let marginal = top + (ways.iter().map(|w| (w.0 - top).exp()).sum::<f64>() / ways.len() as f64).ln();
+    let mut point = points[best].clone();
+    if let Some(axis) = axis {
+        point.columns = vec![point.columns.swap_remove(axis)];
+    }
+    let member =
+        Member { entry: index, axis, theta: point.theta, log_occam: marginal - top, theta_sigma: [0.0; 2], point };
+    (marginal + entry.log_prior, member)
 }
 
 /// Grow sets from `seeds` by one member each at a time, over the entries of `allowed`.
@@ -292,7 +289,7 @@ pub fn grow(frame: &Frame, bank: &Bank, allowed: &[usize], seeds: Vec<Set>, size
                 let mut grown = set.clone();
                 grown.members.push(member);
                 grown.members.sort_by_key(|m| m.entry);
-                grown.score = set.score + gain;
+                grown.score = set.score + gain + crowd(grown.members.len()) - crowd(set.members.len());
                 next.push(grown);
             }
         }

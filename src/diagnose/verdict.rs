@@ -4,7 +4,7 @@ use super::answer::{
     Alternative, Diagnosis, EffectAnswer, Fit, FitLevel, Hypothesis, Located, ParameterAnswer, SeparatingObservation,
     UpperLimit, Verdict,
 };
-use super::catalogue::Effect;
+use super::catalogue::{Effect, WHOLE};
 use super::design::{Chosen, Column, Frame};
 use super::locate;
 use super::model::{self, MemberFit, rms};
@@ -38,7 +38,7 @@ fn ids(library: &Library, set: &Set) -> Vec<String> {
         .iter()
         .map(|m| match library.entries[m.entry].family {
             Family::Listed(effect) => effect.id.to_string(),
-            Family::Open(i) => library.atoms[i].formula.clone(),
+            Family::Open(i) => library.atoms[i].forms[m.theta[0] as usize].formula.clone(),
         })
         .collect()
 }
@@ -153,7 +153,7 @@ fn credible<'a>(scene: &Scene, library: &Library, sets: &'a [Weighed], notes: &m
         let frame = Frame::new(&w.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
         let mut set = w.set.clone();
         set.rewhiten(scene, &frame, &library.entries);
-        let (mean, _) = set.coefficients(&frame, &library.entries);
+        let (mean, covariance) = set.coefficients(&frame, &library.entries);
         let mut next = 0;
         let mut reason = None;
         for (i, m) in set.members.iter().enumerate() {
@@ -167,6 +167,13 @@ fn credible<'a>(scene: &Scene, library: &Library, sets: &'a [Weighed], notes: &m
                         mean[next + k],
                         l.unit,
                         l.size_max
+                    ));
+                }
+                let (fraction, doubt) = (mean[next + k], 2.0 * covariance[(next + k, next + k)].max(0.0).sqrt());
+                if l.whole && (fraction + doubt < WHOLE[0] || fraction - doubt > WHOLE[1]) {
+                    reason = Some(format!(
+                        "{} is refused: the term is left out or it is not, and {fraction:.2} of it is neither",
+                        effect.id
                     ));
                 }
             }
@@ -339,7 +346,7 @@ fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins: bo
         formula.push(format!(
             "[{}] x {}, scaled to unit deviation",
             amplitudes.join(", "),
-            library.atoms[atom].formula
+            library.atoms[atom].forms[m.theta[0] as usize].formula
         ));
         axis.push(m.axis.map_or("x, y, z", |a| ["x", "y", "z"][a]));
         location.push(library.atoms[atom].location);
