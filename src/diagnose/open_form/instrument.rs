@@ -11,6 +11,11 @@ pub(super) fn sensor(c: &mut Collector) {
         c.windows(format!("m{}", AXIS[i]), "modelled_signal", place, m[i].clone());
         c.windows(format!("|m{}|", AXIS[i]), "modelled_signal", place, m[i].iter().map(|x| x.abs()).collect());
         c.windows(format!("m{}^3", AXIS[i]), "modelled_signal", place, m[i].iter().map(|x| x.powi(3)).collect());
+        let last = s.grid_s.len() - 1;
+        c.grid(format!("dm{}/dt", AXIS[i]), "modelled_signal", "a changing modelled signal", |g| {
+            let [a, b] = [g.saturating_sub(1), (g + 1).min(last)];
+            (s.simulated_grid_ng[i][b] - s.simulated_grid_ng[i][a]) / (s.grid_s[b] - s.grid_s[a])
+        });
         for j in i..3 {
             c.windows(
                 format!("m{} m{}", AXIS[i], AXIS[j]),
