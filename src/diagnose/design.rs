@@ -42,6 +42,16 @@ impl Column {
         sum
     }
 
+    /// This column times `factor`.
+    pub fn times(&self, factor: f64) -> Column {
+        let mut out = self.clone();
+        for part in out.parts.iter_mut().flatten() {
+            part.whitened.iter_mut().for_each(|x| *x *= factor);
+            part.constant *= factor;
+        }
+        out
+    }
+
     /// This column less another times `factor`.
     pub fn less(&self, other: &Column, factor: f64) -> Column {
         let mut out = self.clone();
@@ -127,6 +137,34 @@ impl Frame {
     }
 }
 
+/// Normal equations of columns beside those chosen.
+pub struct Normal {
+    a: DMatrix<f64>,
+    y: DVector<f64>,
+}
+
+impl Normal {
+    /// Log evidence gained by these columns, their prior sizes all multiplied by `scale`.
+    pub fn gain(&self, scale: f64) -> f64 {
+        let n = self.y.len();
+        let a = &self.a * (scale * scale) + DMatrix::identity(n, n);
+        match Cholesky::new(a) {
+            Some(c) => {
+                let y = &self.y * scale;
+                let half = c.l_dirty().solve_lower_triangular(&y).unwrap_or_else(|| DVector::zeros(n));
+                0.5 * half.norm_squared() - (0..n).map(|i| c.l_dirty()[(i, i)].ln()).sum::<f64>()
+            }
+            None => f64::NEG_INFINITY,
+        }
+    }
+
+    /// The same for column `i` alone.
+    pub fn gain_of(&self, i: usize, scale: f64) -> f64 {
+        let one_more = scale * scale * self.a[(i, i)] + 1.0;
+        0.5 * (scale * self.y[i]).powi(2) / one_more - 0.5 * one_more.ln()
+    }
+}
+
 /// Columns already chosen: what is left for one more.
 pub struct Chosen<'a> {
     columns: Vec<&'a Column>,
@@ -182,31 +220,27 @@ impl<'a> Chosen<'a> {
         }
     }
 
-    /// Log evidence gained by adding linear columns, and the SNR left in them.
+    /// Log evidence gained by adding linear columns.
     pub fn gain(&self, columns: &[Column]) -> f64 {
+        self.normal(columns).gain(1.0)
+    }
+
+    /// The normal equations of more linear columns beside those chosen.
+    pub fn normal(&self, columns: &[Column]) -> Normal {
         let n = columns.len();
         let overlaps: Vec<DVector<f64>> = columns.iter().map(|c| self.overlap(c)).collect();
         let y = DVector::from_iterator(
             n,
             columns.iter().zip(&overlaps).map(|(c, o)| c.dot(&self.data) - o.dot(&self.reduced)),
         );
-        let mut a = DMatrix::identity(n, n);
+        let mut a = DMatrix::zeros(n, n);
         for i in 0..n {
             for j in 0..=i {
-                let product = columns[i].dot(&columns[j]) - overlaps[i].dot(&overlaps[j]);
-                a[(i, j)] += product;
-                if i != j {
-                    a[(j, i)] += product;
-                }
+                a[(i, j)] = columns[i].dot(&columns[j]) - overlaps[i].dot(&overlaps[j]);
+                a[(j, i)] = a[(i, j)];
             }
         }
-        match Cholesky::new(a) {
-            Some(c) => {
-                let half = c.l_dirty().solve_lower_triangular(&y).unwrap_or_else(|| DVector::zeros(n));
-                0.5 * half.norm_squared() - (0..n).map(|i| c.l_dirty()[(i, i)].ln()).sum::<f64>()
-            }
-            None => f64::NEG_INFINITY,
-        }
+        Normal { a, y }
     }
 
     /// Log evidence gained by adding a column of fixed amplitude one.

@@ -28,6 +28,9 @@ fn crowd(members: usize) -> f64 {
     CROWD * members.saturating_sub(2) as f64
 }
 
+/// Size of a small effect, of its usual size.
+const SMALL: f64 = 0.2;
+
 /// What a family is.
 #[derive(Clone, Copy)]
 pub enum Family {
@@ -83,6 +86,14 @@ impl Entry {
         }
     }
 
+    /// What the prior sizes may be multiplied by, each as likely: an effect is of its usual size or well below it.
+    pub fn scales(&self) -> &'static [f64] {
+        match self.family {
+            Family::Listed(effect) if effect.linear.is_empty() || effect.linear.iter().any(|l| l.whole) => &[1.0],
+            _ => &[1.0, SMALL],
+        }
+    }
+
     fn effect(&self) -> Option<&'static Effect> {
         match self.family {
             Family::Listed(effect) => Some(effect),
@@ -106,10 +117,10 @@ pub struct Bank<'a> {
     points: Vec<Vec<Whitened>>,
 }
 
-fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64]) -> Whitened {
+fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64], scale: f64) -> Whitened {
     let (columns, fixed) = match shape {
-        Shape::Scalar(series) => ((0..3).map(|k| frame.scalar(k, series, sizes[k])).collect(), false),
-        Shape::Columns(raws) => (raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, *size)).collect(), false),
+        Shape::Scalar(series) => ((0..3).map(|k| frame.scalar(k, series, scale * sizes[k])).collect(), false),
+        Shape::Columns(raws) => (raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect(), false),
         Shape::Fixed(axes) => (vec![frame.column(&axes.clone().map(Some), 1.0)], true),
     };
     Whitened { theta, columns, fixed }
@@ -120,7 +131,7 @@ impl<'a> Bank<'a> {
     pub fn new(frame: &Frame, entries: &'a [Entry]) -> Self {
         let points = entries
             .iter()
-            .map(|e| e.points.iter().map(|(theta, shape)| whiten(frame, *theta, shape, &e.sizes)).collect())
+            .map(|e| e.points.iter().map(|(theta, shape)| whiten(frame, *theta, shape, &e.sizes, 1.0)).collect())
             .collect();
         Self { entries, points }
     }
@@ -133,6 +144,8 @@ pub struct Member {
     pub entry: usize,
     /// Axes it acts on, where an open form was narrowed to one.
     pub axis: Option<usize>,
+    /// What its prior sizes are multiplied by.
+    pub scale: f64,
     /// Nonlinear parameters.
     pub theta: Theta,
     /// Their log prior density times the volume of their posterior.
@@ -176,7 +189,7 @@ impl Set {
     /// Whiten the members again for another noise.
     pub fn rewhiten(&mut self, scene: &Scene, frame: &Frame, entries: &[Entry]) {
         for m in &mut self.members {
-            if let Some(point) = point_at(scene, frame, &entries[m.entry], &m.theta, m.axis) {
+            if let Some(point) = point_at(scene, frame, &entries[m.entry], m, &m.theta) {
                 m.point = point;
             }
         }
@@ -185,7 +198,7 @@ impl Set {
     /// Mean and covariance of all linear coefficients in their own units, members in order.
     pub fn coefficients(&self, frame: &Frame, entries: &[Entry]) -> (DVector<f64>, DMatrix<f64>) {
         let sizes: Vec<f64> =
-            self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| member_sizes(m, entries)).collect();
+            self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| m.sizes(entries)).collect();
         let (mean, covariance) = self.chosen(frame).posterior();
         let scale = DMatrix::from_diagonal(&DVector::from_vec(sizes));
         (&scale * mean, &scale * covariance * &scale)
@@ -223,12 +236,15 @@ impl Member {
     pub fn linear(&self) -> usize {
         if self.point.fixed { 0 } else { self.point.columns.len() }
     }
+
+    /// Prior sizes of its linear coefficients.
+    pub fn sizes(&self, entries: &[Entry]) -> Vec<f64> {
+        let sizes = &entries[self.entry].sizes;
+        let picked = self.axis.map_or_else(|| sizes.clone(), |a| vec![sizes[a]]);
+        picked.iter().map(|size| self.scale * size).collect()
+    }
 }
 
-fn member_sizes(m: &Member, entries: &[Entry]) -> Vec<f64> {
-    let sizes = &entries[m.entry].sizes;
-    m.axis.map_or_else(|| sizes.clone(), |a| vec![sizes[a]])
-}
 
 fn shape_at(scene: &Scene, entry: &Entry, theta: &Theta) -> Option<Shape> {
     match entry.effect() {
@@ -237,13 +253,13 @@ fn shape_at(scene: &Scene, entry: &Entry, theta: &Theta) -> Option<Shape> {
     }
 }
 
-fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, theta: &Theta, axis: Option<usize>) -> Option<Whitened> {
+fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, m: &Member, theta: &Theta) -> Option<Whitened> {
     let known = entry.points.iter().find(|(t, _)| t == theta);
     let mut point = match known {
-        Some((_, shape)) => whiten(frame, *theta, shape, &entry.sizes),
-        None => whiten(frame, *theta, &shape_at(scene, entry, theta)?, &entry.sizes),
+        Some((_, shape)) => whiten(frame, *theta, shape, &entry.sizes, m.scale),
+        None => whiten(frame, *theta, &shape_at(scene, entry, theta)?, &entry.sizes, m.scale),
     };
-    if let Some(axis) = axis {
+    if let Some(axis) = m.axis {
         point.columns = vec![point.columns.swap_remove(axis)];
     }
     Some(point)
@@ -255,21 +271,33 @@ pub fn best_of_entry(bank: &Bank, index: usize, chosen: &Chosen) -> (f64, Member
     let points = &bank.points[index];
     // An open form of one series acts on all axes or on one of them: a quarter each.
     let narrow = matches!((entry.family, &entry.points[0].1), (Family::Open(_), Shape::Scalar(_)));
-    let mut ways: Vec<(f64, usize, Option<usize>)> = Vec::with_capacity(points.len() * if narrow { 4 } else { 1 });
+    let scales = entry.scales();
+    let mut ways: Vec<(f64, usize, Option<usize>, f64)> = Vec::with_capacity(points.len() * 8);
     for (i, p) in points.iter().enumerate() {
-        ways.push((if p.fixed { chosen.gain_fixed(&p.columns[0]) } else { chosen.gain(&p.columns) }, i, None));
-        if narrow {
-            ways.extend((0..3).map(|axis| (chosen.gain(&p.columns[axis..=axis]), i, Some(axis))));
+        if p.fixed {
+            ways.push((chosen.gain_fixed(&p.columns[0]), i, None, 1.0));
+            continue;
+        }
+        let normal = chosen.normal(&p.columns);
+        for &scale in scales {
+            ways.push((normal.gain(scale), i, None, scale));
+            if narrow {
+                ways.extend((0..3).map(|axis| (normal.gain_of(axis, scale), i, Some(axis), scale)));
+            }
         }
     }
-    let (top, best, axis) = ways.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::MIN, 0, None));
+    let best = ways.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
+    let (top, best, axis, scale) = best.unwrap_or((f64::MIN, 0, None, 1.0));
     let marginal = top + (ways.iter().map(|w| (w.0 - top).exp()).sum::<f64>() / ways.len() as f64).ln();
     let mut point = points[best].clone();
     if let Some(axis) = axis {
         point.columns = vec![point.columns.swap_remove(axis)];
     }
-    let member =
-        Member { entry: index, axis, theta: point.theta, log_occam: marginal - top, theta_sigma: [0.0; 2], point };
+    if !point.fixed {
+        point.columns = point.columns.iter().map(|c| c.times(scale)).collect();
+    }
+    let theta_sigma = [0.0; 2];
+    let member = Member { entry: index, axis, scale, theta: point.theta, log_occam: marginal - top, theta_sigma, point };
     (marginal + entry.log_prior, member)
 }
 
@@ -329,9 +357,10 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         };
         let chosen = others.chosen(frame);
         let mut theta = set.members[i].theta;
+        let scale = set.members[i].scale;
         let gain = |theta: &Theta| -> f64 {
             let Some(shape) = (effect.signature)(scene, theta) else { return f64::NEG_INFINITY };
-            let point = whiten(frame, *theta, &shape, &entry.sizes);
+            let point = whiten(frame, *theta, &shape, &entry.sizes, scale);
             if point.fixed { chosen.gain_fixed(&point.columns[0]) } else { chosen.gain(&point.columns) }
         };
         let start: Vec<f64> = free.iter().map(|j| theta[*j]).collect();
@@ -353,8 +382,9 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
             continue;
         }
         let (log_occam, sigma) = volume(&gain, &theta, &free, effect, entry.log_volume, peak);
-        if let Some(point) = point_at(scene, frame, entry, &theta, None) {
+        if let Some(point) = point_at(scene, frame, entry, &set.members[i], &theta) {
             let m = &mut set.members[i];
+            let log_occam = log_occam - (entry.scales().len() as f64).ln();
             (m.theta, m.log_occam, m.theta_sigma, m.point) = (theta, log_occam, sigma, point);
         }
     }

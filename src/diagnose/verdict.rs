@@ -258,7 +258,8 @@ fn step_at_mass_change(scene: &Scene, library: &Library, best: &Best) -> Option<
         let raws = (effect.signature)(scene, theta).map(|s| s.columns()).unwrap_or_default();
         let columns: Vec<Column> =
             raws.iter().zip(&entry.sizes).map(|(raw, size)| best.frame.column(raw, *size)).collect();
-        chosen.gain(&columns)
+        let normal = chosen.normal(&columns);
+        entry.scales().iter().map(|scale| normal.gain(*scale)).fold(f64::NEG_INFINITY, f64::max)
     };
     let Family::Listed(step_effect) = step.family else { return None };
     let m = &best.set.members[i];
