@@ -112,6 +112,13 @@ impl Frame {
 
     /// Whiten a regressor, scaled by its prior size.
     pub fn column(&self, raw: &Raw, size: f64) -> Column {
+        let whole = |s: &Vec<f64>| s.first().is_some_and(|x| *x != 0.0) && s.last().is_some_and(|x| *x != 0.0);
+        if let [Some(x), Some(y), Some(z)] = raw
+            && [x, y, z].into_iter().all(whole)
+        {
+            let whitened = Whitener::whiten_three(&self.whiteners, [x, y, z]);
+            return Column { parts: self.whole_parts(whitened, [size; 3]).map(Some) };
+        }
         Column { parts: std::array::from_fn(|k| raw[k].as_ref().map(|series| self.part(k, series, size))) }
     }
 
@@ -120,6 +127,33 @@ impl Frame {
         let mut column = Column::default();
         column.parts[axis] = Some(self.part(axis, series, size));
         column
+    }
+
+    /// Whiten a scalar on each axis: three columns.
+    pub fn scalars(&self, series: &[f64], sizes: &[f64; 3]) -> [Column; 3] {
+        let ends = [series.first(), series.last()];
+        let parts = if ends.iter().all(|x| x.is_some_and(|x| *x != 0.0)) {
+            self.whole_parts(Whitener::whiten_three(&self.whiteners, [series; 3]), *sizes)
+        } else {
+            std::array::from_fn(|k| self.part(k, series, sizes[k]))
+        };
+        let mut axis = 0;
+        parts.map(|part| {
+            let mut column = Column::default();
+            column.parts[axis] = Some(part);
+            axis += 1;
+            column
+        })
+    }
+
+    fn whole_parts(&self, whitened: [Vec<f64>; 3], sizes: [f64; 3]) -> [Part; 3] {
+        let mut axis = 0;
+        whitened.map(|mut whitened| {
+            whitened.iter_mut().for_each(|x| *x *= sizes[axis]);
+            let constant = dot(&whitened, &self.ones[axis]);
+            axis += 1;
+            Part { first: 0, whitened, constant }
+        })
     }
 
     fn part(&self, axis: usize, series: &[f64], size: f64) -> Part {

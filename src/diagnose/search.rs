@@ -119,7 +119,9 @@ pub struct Bank<'a> {
 
 fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64], scale: f64) -> Whitened {
     let (columns, fixed) = match shape {
-        Shape::Scalar(series) => ((0..3).map(|k| frame.scalar(k, series, scale * sizes[k])).collect(), false),
+        Shape::Scalar(series) => {
+            (frame.scalars(series, &std::array::from_fn(|k| scale * sizes[k])).to_vec(), false)
+        }
         Shape::Columns(raws) => (raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect(), false),
         Shape::Fixed(axes) => (vec![frame.column(&axes.clone().map(Some), 1.0)], true),
     };

@@ -7,6 +7,7 @@ use super::answer::{
 use super::catalogue::{Effect, WHOLE};
 use super::design::{Chosen, Column, Frame};
 use super::locate;
+use super::remains::{self, Remains};
 use super::model::{self, MemberFit, rms};
 use super::scene::{Axes, Scene};
 use super::search::{self, Entry, Family, Set, Weighed};
@@ -22,6 +23,11 @@ const RIVAL: f64 = 3.5;
 const MENTION: f64 = 0.004;
 /// A remaining autocorrelation this unlikely makes the errors wider.
 const WHITENESS_P: f64 = 1e-3;
+
+/// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
+const EVIDENCE_SHARE: f64 = 0.8;
+/// What remains overturns an explanation when it has more than this share of the energy explained.
+const REMAINS_SHARE: f64 = 0.03;
 
 /// What the answer rests on.
 struct Best<'a> {
@@ -79,7 +85,7 @@ pub fn conclude(
     let open: Vec<&Weighed> = solution.open.iter().collect();
     let refused = solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior) - top(&listed) > OPEN_MARGIN;
     let open_wins = top(&open) - top(&listed).max(null) > OPEN_MARGIN;
-    let claimed = probability <= claim
+    let claimed = probability <= EVIDENCE_SHARE * claim
         && top(&listed).max(top(&open)).max(solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior))
             > null;
     let verdict = match (claimed, open_wins || refused) {
@@ -93,12 +99,19 @@ pub fn conclude(
         Verdict::Unexplained => solution.listed.first(),
         _ => Some(simplest(&listed)),
     };
-    let mut answer = empty(scene, verdict, probability);
+    let (verdict, chosen, remains) = with_remains(scene, library, solution, (verdict, chosen), claim);
+    let least = remains.as_ref().map_or(1.0, |r| r.probability);
+    let overall = (probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
+    let mut answer = empty(scene, verdict, overall);
     answer.located.covariates =
         locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
     let null_frame = Frame::new(&solution.null.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
     let Some(weighed) = chosen else {
         answer.notes = notes;
+        if let Some(r) = remains.filter(|_| verdict == Verdict::Unexplained) {
+            answer.located.axes.clone_from(&r.axes);
+            answer.hypothesis = Some(of_remains(&r, ""));
+        }
         answer.upper_limits = upper_limits(scene, library, &null_frame, &Set::default());
         answer.fit = Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), &mut answer.notes).0);
         return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder);
@@ -120,11 +133,52 @@ pub fn conclude(
     };
     answer.upper_limits = upper_limits(scene, library, &best.frame, &best.set);
     match verdict {
-        Verdict::Unexplained => answer.hypothesis = Some(hypothesis(library, &best, &listed, open_wins)),
+        Verdict::Unexplained => {
+            answer.hypothesis = Some(match remains.filter(|_| !open_wins && !refused) {
+                Some(r) => of_remains(&r, &format!(" It remains beside {}.", ids(library, &best.set).join(" + "))),
+                None => hypothesis(library, &best, &listed, open_wins),
+            });
+        }
         _ => name(&mut answer, scene, library, &best, &listed),
     }
     answer.notes = notes;
     (answer, signal, ladder)
+}
+
+/// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.
+fn with_remains<'a>(
+    scene: &Scene,
+    library: &Library,
+    solution: &'a Solution,
+    (verdict, chosen): (Verdict, Option<&'a Weighed>),
+    claim: f64,
+) -> (Verdict, Option<&'a Weighed>, Option<Remains>) {
+    let weighed = chosen.unwrap_or(&solution.null);
+    let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let mut set = weighed.set.clone();
+    set.rewhiten(scene, &frame, &library.entries);
+    let left = search::residual(scene, &frame, &library.entries, &set);
+    let after = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &left);
+    let whitened: Axes = std::array::from_fn(|k| after.data.projected(k, &after));
+    let remains = remains::strongest(scene.clock_s(), &whitened, weighed.noise.map(|n| n.rms_ng()));
+    let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
+    let overturns = remains
+        .as_ref()
+        .is_some_and(|r| r.probability <= (1.0 - EVIDENCE_SHARE) * claim && r.energy > REMAINS_SHARE * explained);
+    match verdict {
+        Verdict::Consistent | Verdict::Explained if overturns => (Verdict::Unexplained, chosen, remains),
+        Verdict::Explained => (verdict, chosen, None),
+        _ => (verdict, chosen, remains),
+    }
+}
+
+fn of_remains(r: &Remains, beside: &str) -> Hypothesis {
+    Hypothesis {
+        formula: r.form.clone(),
+        axis: r.axis.clone(),
+        unit: "ng".into(),
+        location: format!("{}.{beside}", r.location),
+    }
 }
 
 fn empty(scene: &Scene, verdict: Verdict, probability: f64) -> Diagnosis {
