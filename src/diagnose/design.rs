@@ -192,7 +192,16 @@ impl Normal {
         }
     }
 
-    /// The same for column `i` alone.
+    /// What the columns explain at most, their sizes free: half the chi square.
+    pub fn explained(&self) -> f64 {
+        let n = self.y.len();
+        let jitter = 1e-9 * self.a.diagonal().max().max(1e-300);
+        let half = Cholesky::new(&self.a + DMatrix::identity(n, n) * jitter)
+            .and_then(|c| c.l_dirty().solve_lower_triangular(&self.y));
+        half.map_or(0.0, |h| 0.5 * h.norm_squared())
+    }
+
+    /// Log evidence gained by column `i` alone.
     pub fn gain_of(&self, i: usize, scale: f64) -> f64 {
         let one_more = scale * scale * self.a[(i, i)] + 1.0;
         0.5 * (scale * self.y[i]).powi(2) / one_more - 0.5 * one_more.ln()

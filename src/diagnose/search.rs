@@ -87,7 +87,7 @@ impl Entry {
     }
 
     /// What the prior sizes may be multiplied by, each as likely: an effect is of its usual size or well below it.
-    pub fn scales(&self) -> &'static [f64] {
+    fn scales(&self) -> &'static [f64] {
         match self.family {
             Family::Listed(effect) if effect.linear.is_empty() || effect.linear.iter().any(|l| l.whole) => &[1.0],
             _ => &[1.0, SMALL],
@@ -119,10 +119,10 @@ pub struct Bank<'a> {
 
 fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64], scale: f64) -> Whitened {
     let (columns, fixed) = match shape {
-        Shape::Scalar(series) => {
-            (frame.scalars(series, &std::array::from_fn(|k| scale * sizes[k])).to_vec(), false)
+        Shape::Scalar(series) => (frame.scalars(series, &std::array::from_fn(|k| scale * sizes[k])).to_vec(), false),
+        Shape::Columns(raws) => {
+            (raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect(), false)
         }
-        Shape::Columns(raws) => (raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect(), false),
         Shape::Fixed(axes) => (vec![frame.column(&axes.clone().map(Some), 1.0)], true),
     };
     Whitened { theta, columns, fixed }
@@ -199,8 +199,7 @@ impl Set {
 
     /// Mean and covariance of all linear coefficients in their own units, members in order.
     pub fn coefficients(&self, frame: &Frame, entries: &[Entry]) -> (DVector<f64>, DMatrix<f64>) {
-        let sizes: Vec<f64> =
-            self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| m.sizes(entries)).collect();
+        let sizes: Vec<f64> = self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| m.sizes(entries)).collect();
         let (mean, covariance) = self.chosen(frame).posterior();
         let scale = DMatrix::from_diagonal(&DVector::from_vec(sizes));
         (&scale * mean, &scale * covariance * &scale)
@@ -246,7 +245,6 @@ impl Member {
         picked.iter().map(|size| self.scale * size).collect()
     }
 }
-
 
 fn shape_at(scene: &Scene, entry: &Entry, theta: &Theta) -> Option<Shape> {
     match entry.effect() {
@@ -299,7 +297,8 @@ pub fn best_of_entry(bank: &Bank, index: usize, chosen: &Chosen) -> (f64, Member
         point.columns = point.columns.iter().map(|c| c.times(scale)).collect();
     }
     let theta_sigma = [0.0; 2];
-    let member = Member { entry: index, axis, scale, theta: point.theta, log_occam: marginal - top, theta_sigma, point };
+    let member =
+        Member { entry: index, axis, scale, theta: point.theta, log_occam: marginal - top, theta_sigma, point };
     (marginal + entry.log_prior, member)
 }
 

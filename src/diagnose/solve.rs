@@ -99,9 +99,10 @@ pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -
 /// The noise with hardly any slow part, `None` where it has hardly any.
 fn quiet(noise: &[AxisNoise; 3]) -> Option<[AxisNoise; 3]> {
     let level = |n: &AxisNoise| QUIET_SHARE * n.white_ng;
-    noise.iter().any(|n| n.slow_ng > 2.0 * level(n)).then(|| {
-        noise.map(|n| AxisNoise { slow_ng: n.slow_ng.min(level(&n)), slow_tau_s: QUIET_TAU_S, ..n })
-    })
+    noise
+        .iter()
+        .any(|n| n.slow_ng > 2.0 * level(n))
+        .then(|| noise.map(|n| AxisNoise { slow_ng: n.slow_ng.min(level(&n)), slow_tau_s: QUIET_TAU_S, ..n }))
 }
 
 /// Sets found at one noise, each kind best first.

@@ -7,8 +7,8 @@ use super::answer::{
 use super::catalogue::{Effect, WHOLE};
 use super::design::{Chosen, Column, Frame};
 use super::locate;
-use super::remains::{self, Remains};
 use super::model::{self, MemberFit, rms};
+use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{self, Entry, Family, Set, Weighed};
 use super::solve::{Library, Solution};
@@ -17,8 +17,9 @@ use super::solve::{Library, Solution};
 const OPEN_MARGIN: f64 = 3.0;
 /// Log odds within which another set is as good, and the smaller of two nested sets is preferred.
 const EQUAL: f64 = 2.3;
-/// Log odds within which a set that does not hold the best one, nor is held by it, cannot be told from it.
-const RIVAL: f64 = 3.5;
+/// Log odds within which a set that does not hold the best one, nor is held by it, cannot be told from it: sets whose signatures
+/// differ by an SNR of three come within this in more than half of all records.
+const RIVAL: f64 = 5.0;
 /// Posterior below which an alternative is not mentioned.
 const MENTION: f64 = 0.004;
 /// A remaining autocorrelation this unlikely makes the errors wider.
@@ -312,8 +313,7 @@ fn step_at_mass_change(scene: &Scene, library: &Library, best: &Best) -> Option<
         let raws = (effect.signature)(scene, theta).map(|s| s.columns()).unwrap_or_default();
         let columns: Vec<Column> =
             raws.iter().zip(&entry.sizes).map(|(raw, size)| best.frame.column(raw, *size)).collect();
-        let normal = chosen.normal(&columns);
-        entry.scales().iter().map(|scale| normal.gain(*scale)).fold(f64::NEG_INFINITY, f64::max)
+        chosen.normal(&columns).explained()
     };
     let Family::Listed(step_effect) = step.family else { return None };
     let m = &best.set.members[i];

@@ -170,4 +170,3 @@ pub fn dictionary(scene: &Scene) -> Vec<Atom> {
 }
 
 const AXIS: [&str; 3] = ["x", "y", "z"];
-
