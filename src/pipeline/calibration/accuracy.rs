@@ -32,6 +32,10 @@ pub struct AxisAccuracy {
     pub bias_fit_rms_used_ng: f64,
     /// Measurements, and degrees of freedom of the fit.
     pub measurements: usize,
+    /// Of those, measurements while quiet was asserted.
+    pub quiet_measurements: usize,
+    /// RMS of measured less fitted bias of these, counts and ng; None without any.
+    pub quiet_fit_rms: Option<[f64; 2]>,
     /// Degrees of freedom.
     pub degrees_of_freedom: f64,
     /// Bias fit RMS / sqrt(degrees of freedom), ng.

@@ -110,6 +110,8 @@ pub struct Measured {
     pub mean_counts: f64,
     /// Standard error of the trimmed mean if its samples were independent, counts.
     pub independent_counts: f64,
+    /// Error of the trimmed mean by rounding to whole counts, counts.
+    pub rounding_counts: f64,
     /// Factor from independent to true, where the calibration has none.
     pub noise_factor: f64,
 }
@@ -164,7 +166,8 @@ impl Calibration {
         let trimmed_ng = (measured.trimmed_counts - bias_counts) * ng_per_count;
         let scale_ng = trimmed_ng * scale.sigma / scale.correction;
         let factor = self.noise.map_or(measured.noise_factor, |noise| noise.factor[axis]);
-        let counts_ng = ng_per_count * (factor * measured.independent_counts).hypot(bias_sigma);
+        let noise = (factor * measured.independent_counts).hypot(measured.rounding_counts);
+        let counts_ng = ng_per_count * noise.hypot(bias_sigma);
         Some(Calibrated {
             trimmed_ng,
             mean_ng: (measured.mean_counts - bias_counts) * ng_per_count,

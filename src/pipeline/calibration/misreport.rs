@@ -179,11 +179,12 @@ fn settle_span(
     let letters: Vec<String> = axes.iter().map(|axis| axis.letter().to_uppercase()).collect();
     let hours = (to.tenths() - from.tenths()) as f64 / 36_000.0;
     let sentence = format!(
-        "For {hours:.2} h the records say range {} in {} while the sensor was in range {}: the samples scatter {value:.3} times \
+        "For {hours:.2} h the records say range {} in {} while the sensor was in range {}: the samples scatter {} times \
          less than they would; the windows are calibrated in range {} and flagged range_corrected.",
         reported_range.letter(),
         letters.join(", "),
         span.actual.letter(),
+        if value >= 10.0 { format!("{value:.0}") } else { format!("{value:.3}") },
         span.actual.letter(),
     );
     let anomaly = Anomaly {

@@ -18,6 +18,7 @@ pub mod sequence;
 pub mod settling;
 pub mod time_correlation;
 mod two_position;
+mod unsteady;
 mod version;
 
 use std::collections::BTreeMap;
@@ -96,8 +97,11 @@ pub fn derive(
 ) -> Derived {
     let law = &settings.window.trim;
     let holds = sequence::holds(archive, windows);
-    let pairs = two_position::pairs(&holds);
-    let scales = scale_factor::sequences(archive, &holds, law);
+    let mut pairs = two_position::pairs(&holds);
+    let excess = unsteady::excess(&holds, &pairs, windows, settings);
+    pairs.iter_mut().zip(excess).for_each(|(pair, excess)| pair.excess_ng2 = excess);
+    let mut scales = scale_factor::sequences(archive, &holds, law);
+    unsteady::of_scales(&holds, &mut scales, windows, settings);
     let history = NoiseHistory::new(windows, &settings.instrument.resolution_ng);
     let configured = settings.window.correlated_samples.sqrt();
     let material = Material { pairs: &pairs, scales: &scales, settings };
@@ -211,8 +215,11 @@ fn analyse(axis: Axis, derived: &Derived) -> Option<AxisAccuracy> {
     let resolution = calibration.resolution_ng[axis.index()][Range::C.index()];
     let count = fit.residuals.len();
     let all = (fit.residuals.iter().map(|r| r * r).sum::<f64>() / count as f64).sqrt();
-    let of_law = derived.measurements.iter().filter(|m| m.axis == axis && m.range == Range::C);
-    let sigmas: Vec<f64> = of_law
+    let of_law = || derived.measurements.iter().filter(|m| m.axis == axis && m.range == Range::C);
+    let quiet: Vec<f64> =
+        of_law().zip(&fit.residuals).filter(|(m, _)| m.quiet && m.weight > 0.0).map(|(_, r)| r * r).collect();
+    let quiet_rms = (quiet.iter().sum::<f64>() / quiet.len().max(1) as f64).sqrt();
+    let sigmas: Vec<f64> = of_law()
         .filter_map(|m| calibration.bias_and_error(axis, Range::C, m.clock_s, m.temperature_c).map(|[_, sigma]| sigma))
         .collect();
     let [rms, mean, differences] = calibration.noise?.signal_differences[axis.index()];
@@ -226,6 +233,8 @@ fn analyse(axis: Axis, derived: &Derived) -> Option<AxisAccuracy> {
         bias_fit_rms_ng: all * resolution,
         bias_fit_rms_used_ng: fit.residual_rms * resolution,
         measurements: count,
+        quiet_measurements: quiet.len(),
+        quiet_fit_rms: (!quiet.is_empty()).then_some([quiet_rms, quiet_rms * resolution]),
         degrees_of_freedom: fit.degrees_of_freedom,
         statistical_ng,
         fitted_sigma_ng: sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64 * resolution,

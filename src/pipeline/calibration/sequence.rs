@@ -1,9 +1,9 @@
 //! The steps of the calibration sequences, cut out of the records: runs of seconds in one mode, target, step and range.
 
-use crate::math::robust::{TrimLaw, TrimmedMean, trimmed_mean};
+use crate::math::robust::{TrimLaw, TrimmedMean, spread_counts, trimmed_mean_of_values};
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
 use crate::pipeline::window::Window;
-use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, SAMPLES_PER_RECORD, Step};
+use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, Step};
 use crate::units::Clock;
 
 /// Two records of one step are no further apart than this, tenths of a second: lost seconds do not end a step.
@@ -75,26 +75,27 @@ impl Hold<'_> {
         })
     }
 
-    /// The adaptive trimmed mean of an axis after taking a transient away; None of fewer than `samples_min` samples.
+    /// The adaptive trimmed mean of an axis, its counts spread over their width, after taking a transient away; None of fewer
+    /// than `samples_min` samples.
     pub fn mean(
         &self,
         axis: Axis,
         law: &TrimLaw,
         samples_min: usize,
-        transient: impl Fn(f64) -> f64,
+        transient: Option<&dyn Fn(f64) -> f64>,
     ) -> Option<TrimmedMean> {
-        let mut counts: Vec<i16> =
-            self.samples(axis).map(|(t_s, count)| (f64::from(count) - transient(t_s)).round() as i16).collect();
-        if counts.len() < samples_min {
+        let mut samples: Vec<(f64, i16)> = self.samples(axis).collect();
+        if samples.len() < samples_min {
             return None;
         }
-        counts.sort_unstable();
-        trimmed_mean(&counts, law)
-    }
-
-    /// Whether seconds or samples are missing that the step should have.
-    pub fn is_cut(&self, seconds: usize) -> bool {
-        self.records.len() < seconds || self.records.len() * SAMPLES_PER_RECORD < seconds * SAMPLES_PER_RECORD
+        samples.sort_unstable_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
+        let counts: Vec<i16> = samples.iter().map(|(_, count)| *count).collect();
+        let mut values = spread_counts(&counts);
+        if let Some(transient) = transient {
+            values.iter_mut().zip(&samples).for_each(|(value, (t_s, _))| *value -= transient(*t_s));
+            values.sort_unstable_by(f64::total_cmp);
+        }
+        trimmed_mean_of_values(&values, law)
     }
 }
 
