@@ -92,6 +92,17 @@ fn belongs_to(kind: AnomalyKind, told: &Anomaly) -> bool {
     told.kind == kind || (kind == AnomalyKind::RangeMisreport && told.kind == AnomalyKind::Saturation)
 }
 
+/// A calibration taken while the attitude is held: one during a manoeuvre is worth nothing anyway, and an outlier in it no news.
+fn steady_calibration(config: &MissionConfig, random: &mut ChaCha8Rng) -> u16 {
+    let turns = |id: &u16| {
+        let from_s = f64::from(config.start_clock_s + 600 + u32::from(id - 1) * 251 * 60);
+        let (from_s, to_s) = (from_s - config.manoeuvre_s - 300.0, from_s + 1200.0);
+        config.attitudes.iter().skip(1).any(|hold| (from_s..to_s).contains(&hold.from_clock_s))
+    };
+    let steady: Vec<u16> = (1..=5).filter(|id| !turns(id)).collect();
+    steady[random.random_range(0..steady.len())]
+}
+
 /// A day with one fault of a kind, at twice the report's size where that has one.
 fn planted(kind: AnomalyKind, seed: u64) -> MissionConfig {
     let mut config = clean_day(seed);
@@ -129,7 +140,7 @@ fn planted(kind: AnomalyKind, seed: u64) -> MissionConfig {
             let mut counts = [0.0; 3];
             let axis = random.random_range(0..3);
             counts[axis] = 2.0 * [331.0, 182.0, 73.0][axis] * if random.random_bool(0.5) { 1.0 } else { -1.0 };
-            let calibration_id = random.random_range(1..=5);
+            let calibration_id = steady_calibration(&config, &mut random);
             config.faults.push(Fault::BiasOutlier { calibration_id, counts });
         }
         AnomalyKind::OneSidedTrim => config.one_sided_on_board = true,

@@ -24,7 +24,7 @@ pub struct AxisAccuracy {
     pub signal_differences: f64,
     /// RMS of measured less fitted bias over all measurements, counts.
     pub bias_fit_rms_counts: f64,
-    /// The same without outliers.
+    /// The same without outliers, and without measurements taken while the Orbiter turned.
     pub bias_fit_rms_used_counts: f64,
     /// The same, ng (nominal).
     pub bias_fit_rms_ng: f64,

@@ -58,6 +58,13 @@ pub enum Bias {
 }
 
 impl Bias {
+    fn law(&self) -> &BiasLaw {
+        match self {
+            Bias::Known(law) => law,
+            Bias::Fitted(fit) => &fit.law,
+        }
+    }
+
     /// Bias and its standard error, counts; and whether the clock lies outside the measurements.
     fn at(&self, met_h: f64, temperature_c: f64) -> (f64, f64, bool) {
         match self {
@@ -145,7 +152,7 @@ impl Calibration {
     /// Bias of an axis and range, counts; None when there is none yet.
     pub fn bias_at(&self, axis: Axis, range: Range, clock_s: f64, temperature_c: f64) -> Option<f64> {
         let bias = self.bias[axis.index()][range.index()].as_ref()?;
-        Some(bias.at(self.time.met_h(clock_s), temperature_c).0)
+        Some(bias.law().counts(self.time.met_h(clock_s), temperature_c))
     }
 
     /// Bias and its standard error, counts.

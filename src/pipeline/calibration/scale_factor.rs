@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use super::sequence::{Hold, next_step};
-use crate::math::robust::{TrimLaw, TrimmedMean, rounding_error_spread};
+use crate::math::robust::{TrimmedMean, rounding_error_spread};
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
 use crate::telemetry::{Axis, Mode, Range, Step, TableReport};
 use crate::units::{Clock, NANO_G_M_S2};
@@ -162,7 +162,7 @@ fn axis_of(target: u8) -> Option<Axis> {
 }
 
 /// Every scale sequence in the archive, usable or not, in order of time.
-pub fn sequences(archive: &Archive, holds: &[Hold<'_>], law: &TrimLaw) -> Vec<ScaleSequence> {
+pub fn sequences(archive: &Archive, holds: &[Hold<'_>]) -> Vec<ScaleSequence> {
     let table: BTreeMap<i64, &TableReport> = if holds.iter().any(|hold| hold.mode() == Mode::Scale) {
         archive
             .table()
@@ -174,7 +174,7 @@ pub fn sequences(archive: &Archive, holds: &[Hold<'_>], law: &TrimLaw) -> Vec<Sc
     };
     (0..holds.len())
         .filter(|place| holds[*place].mode() == Mode::Scale && holds[*place].step() == Step::PreRate)
-        .filter_map(|place| sequence(archive, holds, place, &table, law))
+        .filter_map(|place| sequence(archive, holds, place, &table))
         .collect()
 }
 
@@ -183,7 +183,6 @@ fn sequence(
     holds: &[Hold<'_>],
     place: usize,
     table: &BTreeMap<i64, &TableReport>,
-    law: &TrimLaw,
 ) -> Option<ScaleSequence> {
     let pre = &holds[place];
     let axis = axis_of(pre.target())?;
@@ -215,7 +214,7 @@ fn sequence(
         let rounding = rounding_error_spread(mean.winsorised_sd);
         [mean.mean, mean.independent_standard_error_of_spread().hypot(rounding / RATIO_OF_NOISE)]
     };
-    let mean = |hold: &Hold<'_>, least: usize| hold.mean(axis, law, least, None).map(figures);
+    let mean = |hold: &Hold<'_>, least: usize| hold.mean(axis, least).map(figures);
     let means = (mean(pre, STILL_SAMPLES_MIN), mean(rate, RATE_SAMPLES_MIN), mean(post, STILL_SAMPLES_MIN));
     let (Some(a), Some(b), Some(c)) = means else {
         found.refusal = Some(Refusal::Gap);

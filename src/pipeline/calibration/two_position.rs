@@ -102,10 +102,10 @@ impl Pair<'_, '_> {
         settings: &Settings,
     ) -> Option<BiasMeasurement> {
         let (law, least) = (&settings.window.trim, settings.window.samples_min);
-        let at_zero = self.normal.mean(axis, law, least, None)?;
-        let raw = self.opposite.mean(axis, law, least, None)?;
+        let at_zero = self.normal.mean(axis, least)?;
+        let raw = self.opposite.mean(axis, least)?;
         let freed = match transient {
-            Some(transient) => self.opposite.mean(axis, law, least, Some(&|t_s| transient.counts(t_s)))?,
+            Some(transient) => self.opposite.mean_without(axis, law, least, Some(&|t_s| transient.counts(t_s)))?,
             None => raw,
         };
         let error = |mean: &TrimmedMean| {

@@ -6,14 +6,15 @@
 //! and range, a straight line for the signal, and a random walk; the walk's rate is the one of largest likelihood, and counts
 //! only where that likelihood is beyond what chance gives.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 use nalgebra::{DMatrix, DVector};
 
 use super::scale_factor::ScaleSequence;
 use super::sequence::Hold;
 use super::two_position::Pair;
-use crate::math::robust::{rounding_error_trimmed, sort_counts, trimmed_mean};
+use crate::math::robust::rounding_error_spread;
 use crate::pipeline::settings::Settings;
 use crate::pipeline::window::Window;
 use crate::telemetry::{Axis, Mode, Quality, Range, Step};
@@ -33,6 +34,26 @@ const LN_RATIO_MIN: f64 = 6.3;
 /// Trial variances of half the change of the walk between the positions, over the variance of a reading.
 const TRIALS: [f64; 14] = [0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5, 1e6];
 
+/// Excess variances of a calibration by the hash of its readings, made before: they depend on nothing else.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Walks {
+    known: HashMap<u64, f64>,
+}
+
+impl Walks {
+    /// The variance of these readings, from what is known or made now.
+    fn of(&mut self, previous: Option<&Walks>, readings: &[Reading]) -> f64 {
+        let mut hasher = DefaultHasher::new();
+        for r in readings {
+            (r.clock_s.to_bits(), r.ng.to_bits(), r.variance_ng2.to_bits(), r.bias, r.sign > 0.0).hash(&mut hasher);
+        }
+        let key = hasher.finish();
+        let variance = previous.and_then(|walks| walks.known.get(&key).copied()).unwrap_or_else(|| walk(readings));
+        self.known.insert(key, variance);
+        variance
+    }
+}
+
 /// One level of one axis.
 struct Reading {
     clock_s: f64,
@@ -50,7 +71,9 @@ pub(super) fn excess(
     pairs: &[Pair<'_, '_>],
     windows: &BTreeMap<i64, Window>,
     settings: &Settings,
+    walks: (&mut Walks, Option<&Walks>),
 ) -> Vec<[f64; 3]> {
+    let (made, previous) = walks;
     let mut found = vec![[0.0; 3]; pairs.len()];
     let mut first = 0;
     while first < pairs.len() {
@@ -63,7 +86,7 @@ pub(super) fn excess(
             readings.extend(around.iter().filter_map(|hold| reading(hold, axis, SHARED_BIAS, 1.0, settings)));
             let span_s = [start_s, of_calibration[count - 1].opposite.last().seconds()];
             readings.extend(window_readings(span_s, windows, axis, settings));
-            let variance = walk(&readings);
+            let variance = made.of(previous, &readings);
             found[first..first + count].iter_mut().for_each(|of_pair| of_pair[axis.index()] = variance);
         }
         first += count;
@@ -78,7 +101,9 @@ pub(super) fn of_scales(
     sequences: &mut [ScaleSequence],
     windows: &BTreeMap<i64, Window>,
     settings: &Settings,
+    walks: (&mut Walks, Option<&Walks>),
 ) {
+    let (made, previous) = walks;
     let levels: Vec<&Hold<'_>> = holds
         .iter()
         .filter(|hold| hold.mode() == Mode::Scale && matches!(hold.step(), Step::PreRate | Step::PostRate))
@@ -110,7 +135,7 @@ pub(super) fn of_scales(
                 })
                 .collect();
             readings.extend(window_readings([start.seconds(), end.seconds()], windows, axis, settings));
-            walk(&readings)
+            made.of(previous, &readings)
         });
         for sequence in of_calibration {
             let resolution = settings.instrument.resolution_ng(sequence.axis, sequence.range);
@@ -150,15 +175,10 @@ fn around<'h, 'a>(holds: &'h [Hold<'a>], pairs: &[Pair<'h, 'a>]) -> Vec<&'h Hold
 }
 
 fn reading(hold: &Hold<'_>, axis: Axis, bias: usize, sign: f64, settings: &Settings) -> Option<Reading> {
-    let mut counts: Vec<i16> = hold.samples(axis).map(|(_, count)| count).collect();
-    if counts.len() < settings.window.samples_min {
-        return None;
-    }
-    sort_counts(&mut counts);
-    let mean = trimmed_mean(&counts, &settings.window.trim)?;
+    let mean = hold.mean(axis, settings.window.samples_min)?;
     let resolution = settings.instrument.resolution_ng(axis, hold.range(axis));
-    let noise = settings.window.correlated_samples.sqrt() * mean.independent_standard_error();
-    let error_ng = resolution * noise.hypot(rounding_error_trimmed(mean.winsorised_sd));
+    let noise = settings.window.correlated_samples.sqrt() * mean.independent_standard_error_of_spread();
+    let error_ng = resolution * noise.hypot(rounding_error_spread(mean.winsorised_sd));
     let ng = resolution * mean.mean;
     Some(Reading { clock_s: hold.centre_s(), ng, variance_ng2: error_ng * error_ng, bias, sign })
 }

@@ -63,7 +63,8 @@ fn chart<'a, 'b>(area: &'a Canvas<'b>, panel: &Panel<'_>) -> Result<Chart<'a, 'b
         .build_cartesian_2d(panel.x[0]..panel.x[1], low..high)
         .map_err(said)?;
     let decimals = digits(high - low).saturating_sub(1);
-    let label = move |y: &f64| format!("{y:.decimals$}");
+    // Rounding leaves no negative zero.
+    let label = move |y: &f64| format!("{:.decimals$}", if y.abs() < 1e-9 { 0.0 } else { *y });
     let mut mesh = chart.configure_mesh();
     mesh.disable_x_mesh()
         .light_line_style(TRANSPARENT)
@@ -82,10 +83,14 @@ fn chart<'a, 'b>(area: &'a Canvas<'b>, panel: &Panel<'_>) -> Result<Chart<'a, 'b
     Ok(chart)
 }
 
-/// The span of values that are not outliers, with some room; `symmetric` around zero.
-fn span<'d>(dots: impl Iterator<Item = &'d Dot>, symmetric: bool) -> [f64; 2] {
+/// A value so many times less sure than the surest does not set the scale.
+const UNSURE: f64 = 6.0;
+
+/// The span of values that are used and not unsure, with some room; `symmetric` around zero.
+fn span<'d>(dots: impl Iterator<Item = &'d Dot> + Clone, symmetric: bool) -> [f64; 2] {
+    let surest = dots.clone().filter(|dot| dot.used).map(|dot| dot.sigma).fold(f64::INFINITY, f64::min);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for dot in dots.filter(|dot| dot.used) {
+    for dot in dots.filter(|dot| dot.used && dot.sigma < UNSURE * surest) {
         low = low.min(dot.value - 2.0 * dot.sigma);
         high = high.max(dot.value + 2.0 * dot.sigma);
     }
@@ -98,6 +103,10 @@ fn span<'d>(dots: impl Iterator<Item = &'d Dot>, symmetric: bool) -> [f64; 2] {
     }
     let room = 0.06 * (high - low);
     [low - room, high + room]
+}
+
+fn widest(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
 }
 
 fn dots<'d>(chart: &mut Chart<'_, '_>, all: impl Iterator<Item = &'d Dot> + Clone, y: [f64; 2]) -> Result<(), String> {
@@ -130,7 +139,7 @@ pub fn bias(plates: &Plates, biases: &Biases) -> Drawn {
             let plate = &biases.axes[row];
             let letter = Axis::ALL[row].letter().to_uppercase();
             let (wide, narrow) = area.split_horizontally(560);
-            let y = span(plate.measured.iter().chain(&plate.fitted), false);
+            let y = widest(span(plate.measured.iter(), false), span(plate.fitted.iter(), false));
             let name = format!("{letter}, counts");
             let mut drawn = chart(&wide, &Panel { x: plates.span_h, y, name: &name, time_below: row == 2 })?;
             let band: Vec<(f64, f64)> = plate

@@ -91,7 +91,7 @@ fn under(station: &Station, plates: &Plates) -> String {
     let calibrated = station.products().filter(|product| product.acceleration.is_some()).count();
     let [from, to] = plates.span_h;
     let gaps = station.gaps();
-    let missing_s: f64 = gaps.iter().map(|(from, to)| to.seconds() - from.seconds()).sum();
+    let missing_s: f64 = gaps.iter().fold(0.0, |sum, (from, to)| sum + to.seconds() - from.seconds());
     format!(
         "{from:.1} to {to:.1} h after lift-off · {windows} windows of 50 s, {calibrated} of them calibrated · {} gaps, {missing_s:.0} s \
          missing · {} versions of the calibration",
