@@ -71,7 +71,9 @@ fn rederive(settings: &Settings) -> Derived {
     flown.refresh(cells, settings);
     let before = calibration::derive(&flown.archive, &flown.windows, settings, None, None);
     let old = flown.products(&before, settings);
-    late.into_iter().for_each(|(record, sequence)| drop(flown.archive.add(record, sequence)));
+    for (record, sequence) in late {
+        flown.archive.add(record, sequence);
+    }
     let cells: Vec<i64> = flown.archive.cells().filter(|cell| *cell >= first_late).collect();
     flown.refresh(cells, settings);
     let mut derived = before.clone();

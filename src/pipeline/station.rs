@@ -275,7 +275,7 @@ impl Station {
     /// Derives the calibration anew where anything it depends on came; whether a product may change by it.
     fn recompute_calibration(&mut self) -> bool {
         let due = self.cells_unchecked >= CHECK_CELLS.max(self.windows.len() / CHECK_SHARE);
-        if !std::mem::take(&mut self.calibration_touched) && !(due && self.checks_touched) {
+        if !(std::mem::take(&mut self.calibration_touched) || due && self.checks_touched) {
             return false;
         }
         self.checks_touched = false;

@@ -130,7 +130,7 @@ fn biases(station: &Station, range: Range, products: &[&Product]) -> Biases {
             .step_by(step)
             .filter_map(|product| {
                 let clock_s = product.start.seconds() + 25.0;
-                let [value, sigma] = law(clock_s, f64::from(product.temperature_c?))?;
+                let [value, sigma] = law(clock_s, product.temperature_c?)?;
                 Some(Dot { met_h: time.met_h(clock_s), value, sigma, used: true })
             })
             .collect();
@@ -178,8 +178,7 @@ fn history(span_h: [f64; 2], inside: &[(f64, &Product)]) -> History {
         history.runs[axis] = runs;
     }
     let step = inside.len().div_ceil(POINTS_MAX).max(1);
-    history.temperature =
-        inside.iter().step_by(step).filter_map(|(h, p)| Some((*h, f64::from(p.temperature_c?)))).collect();
+    history.temperature = inside.iter().step_by(step).filter_map(|(h, p)| Some((*h, p.temperature_c?))).collect();
     history
 }
 
