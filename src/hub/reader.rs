@@ -128,10 +128,12 @@ impl Reader {
         let mut messages = Vec::new();
         let mut clocks = Vec::new();
         let at = state.journal.partition_point(|entry| entry.last_seq() <= self.after);
+        let mut read_through = head;
         for entry in state.journal.range(at..) {
             let first = entry.first_seq().max(self.after + 1);
             let room = messages_max.saturating_sub(messages.len() + clocks.len()) as u64;
             if room == 0 {
+                read_through = self.after;
                 break;
             }
             if !self.topics.has(entry.topic()) {
@@ -148,7 +150,13 @@ impl Reader {
                 }
             }
             self.after = last;
+            if last < entry.last_seq() {
+                read_through = last;
+                break;
+            }
         }
+        // Numbers between the last entry and the head were left out after a crash.
+        self.after = read_through;
         drop(state);
         if !clocks.is_empty() {
             let seconds = clocks.into_iter().filter_map(|(seq, clock)| Some((seq, hub.samples.second(clock)?)));

@@ -112,6 +112,11 @@ impl Station {
         self.announces_raw = wanted;
     }
 
+    /// Drops the changes that wait to be told.
+    pub fn forget_changes(&mut self) {
+        self.waiting.clear();
+    }
+
     /// A playback starts. Numbers are the caller's, in order of arrival.
     pub fn open_playback(&mut self, id: PlaybackId) {
         self.ledger.playback_mut(id);
@@ -220,8 +225,23 @@ impl Station {
     /// Brings windows, calibration and products up to date with the frames taken, and tells what changed. A window that is
     /// not whole is announced when nothing more came for it since the last time.
     pub fn settle(&mut self) -> Vec<Change> {
+        self.bring_up(true)
+    }
+
+    /// As [`Station::settle`], with the calibration as it is: while much is coming, deriving it from everything time and again would
+    /// cost more than all the rest. It catches up with the next `settle`.
+    pub fn refresh(&mut self) -> Vec<Change> {
+        self.bring_up(false)
+    }
+
+    /// Whether telemetry came that the calibration in use does not know yet.
+    pub fn calibration_waits(&self) -> bool {
+        self.calibration_touched
+    }
+
+    fn bring_up(&mut self, calibrating: bool) -> Vec<Change> {
         let touched = self.recompute_windows();
-        let calibration_changed = self.recompute_calibration();
+        let calibration_changed = calibrating && self.recompute_calibration();
         if calibration_changed {
             let all: Vec<i64> = self.windows.keys().copied().collect();
             self.recompute_products(all);
@@ -335,6 +355,11 @@ impl Station {
     /// Products in order of their windows.
     pub fn products(&self) -> impl DoubleEndedIterator<Item = &Product> {
         self.products.values()
+    }
+
+    /// The product of a window.
+    pub fn product(&self, start: Clock) -> Option<&Product> {
+        self.products.get(&cell_of(start)).filter(|product| product.start == start)
     }
 
     /// Products of windows that start in `[from, to)`, in order.
