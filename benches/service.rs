@@ -232,7 +232,7 @@ fn windows() -> Vec<Body> {
         .map(|(product, n)| {
             let mut product = *product;
             product.start = oare_ground::units::Clock::from_tenths(n * 250);
-            Body::Window(product)
+            Body::Window(product.into())
         })
         .collect()
 }

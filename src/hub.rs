@@ -37,10 +37,10 @@ pub trait SampleSource: Send + Sync {
 }
 
 /// A window as it is known now.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Held {
     /// The window.
-    pub product: Product,
+    pub product: Arc<Product>,
     /// Number of the last message about it.
     pub seq: u64,
     /// The revision that message told: after a restart the product may be a later one until it is told of.
@@ -143,7 +143,7 @@ impl Hub {
         entries: Vec<Entry>,
         told: impl IntoIterator<Item = Told>,
         numbered_through: u64,
-        product: impl Fn(Clock) -> Option<Product>,
+        product: impl Fn(Clock) -> Option<Arc<Product>>,
     ) {
         let mut state = self.state.write().expect("no holder panics");
         state.forgotten_through = entries.first().map_or(0, |entry| entry.first_seq() - 1);
@@ -219,7 +219,7 @@ impl Hub {
         if let Some(held) = newest
             && latest.is_none_or(|latest| latest.product.revision != held.product.revision)
         {
-            *latest = Some(Latest { product: held.product, since: Instant::now() });
+            *latest = Some(Latest { product: *held.product, since: Instant::now() });
         }
     }
 
@@ -244,7 +244,7 @@ impl Hub {
             return Vec::new();
         }
         let state = self.state.read().expect("no holder panics");
-        state.windows.range(from..=to).map(|(_, held)| held.product).collect()
+        state.windows.range(from..=to).map(|(_, held)| *held.product).collect()
     }
 
     /// Start of the first and of the last window.
@@ -257,7 +257,7 @@ impl Hub {
 impl State {
     fn take_up(&mut self, seq: u64, body: Body, ring_messages_max: usize) {
         if let Body::Window(product) | Body::Supersede(product, _) = &body {
-            self.windows.insert(product.start, Held { product: *product, seq, told: product.revision });
+            self.windows.insert(product.start, Held { product: product.clone(), seq, told: product.revision });
         }
         let ring = &mut self.rings[body.topic() as usize];
         ring.last_seq = seq;

@@ -133,7 +133,7 @@ fn write_recording(station: &Station, streams: &[Stream], path: &Path) -> Result
     });
     written.with_context(cannot)?;
     for (seq, product) in (1..).zip(station.products()) {
-        recording.message(&Message::new(seq, Body::Window(*product))).with_context(cannot)?;
+        recording.message(&Message::new(seq, Body::Window((*product).into()))).with_context(cannot)?;
     }
     recording.finish().with_context(cannot)?;
     Ok(())

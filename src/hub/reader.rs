@@ -51,7 +51,7 @@ impl Hub {
         let mut messages = Vec::new();
         if topics.has(super::Topic::Window) {
             let held = state.windows.range(from..).map(|(_, held)| held);
-            messages.extend(held.map(|held| Arc::new(Message::new(held.seq, Body::Window(held.product)))));
+            messages.extend(held.map(|held| Arc::new(Message::new(held.seq, Body::Window(held.product.clone())))));
         }
         for entry in &state.journal {
             if let Entry::Told { seq, topic, clock, json } = &**entry
@@ -192,7 +192,7 @@ impl State {
         let body = match entry {
             Entry::Told { topic, clock, json, .. } => Body::Told { topic: *topic, clock: *clock, json: json.clone() },
             Entry::Windows { supersedes, .. } => {
-                let product = self.windows.get(&entry.clock_of(seq))?.product;
+                let product = self.windows.get(&entry.clock_of(seq))?.product.clone();
                 if *supersedes { Body::Supersede(product, None) } else { Body::Window(product) }
             }
             Entry::Seconds { .. } => return None,

@@ -2,6 +2,8 @@
 //!
 //! The names are those of `windows.csv`; accelerations in ng with three decimals, an unknown value is `null`.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 use utoipa::ToSchema;
 
@@ -285,19 +287,28 @@ pub fn members(kind: &str, value: &impl Serialize) -> String {
 
 /// The JSON members of a message, made once and shared by all who read it.
 pub fn message_members<'a>(mission: &MissionTime, message: &'a Message) -> &'a [u8] {
-    message.text.get_or_init(|| {
-        let text = match &message.body {
-            Body::Window(product) => members("window", &Window::new(mission, product)),
-            Body::Supersede(product, supersedes) => {
-                let window = members("supersede", &Window::new(mission, product));
-                match supersedes {
-                    Some(revision) => format!("{window},\"supersedes\":\"{revision}\""),
-                    None => window,
-                }
+    message.text.get_or_init(|| made_members(mission, message).into())
+}
+
+/// The JSON members of a message for one reader alone: made by another reader, or made and not kept.
+pub fn passing_members<'a>(mission: &MissionTime, message: &'a Message) -> Cow<'a, [u8]> {
+    match message.text.get() {
+        Some(text) => Cow::Borrowed(text),
+        None => Cow::Owned(made_members(mission, message).into_bytes()),
+    }
+}
+
+fn made_members(mission: &MissionTime, message: &Message) -> String {
+    match &message.body {
+        Body::Window(product) => members("window", &Window::new(mission, product)),
+        Body::Supersede(product, supersedes) => {
+            let window = members("supersede", &Window::new(mission, product));
+            match supersedes {
+                Some(revision) => format!("{window},\"supersedes\":\"{revision}\""),
+                None => window,
             }
-            Body::Second(record) => members("raw", &RawSecond::new(mission, record)),
-            Body::Told { json, .. } => json.clone(),
-        };
-        text.into()
-    })
+        }
+        Body::Second(record) => members("raw", &RawSecond::new(mission, record)),
+        Body::Told { json, .. } => json.clone(),
+    }
 }

@@ -29,7 +29,7 @@ const NUMBERED: TableDefinition<&[u8], u64> = TableDefinition::new("numbered");
 const TOLD: TableDefinition<&[u8], &[u8]> = TableDefinition::new("told");
 
 /// The store reads through this much of its own cache; the operating system has more.
-const CACHE_OCTETS: usize = 24 << 20;
+const CACHE_OCTETS: usize = 8 << 20;
 
 /// What happened at the dump port, in the order of the log.
 #[derive(Debug, Clone, PartialEq)]

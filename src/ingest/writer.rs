@@ -82,7 +82,9 @@ impl Writer {
         hub: Arc<Hub>,
         board: Arc<Board>,
     ) -> Result<Self, StoreError> {
+        let start = Instant::now();
         let journal = log.journal()?;
+        let messages = journal.entries.len();
         let mut orphans: HashMap<u32, (u64, u64)> = HashMap::new();
         let (mut batch, mut playbacks) = (0, 0);
         {
@@ -125,6 +127,7 @@ impl Writer {
         writer.published = writer.batch;
         writer.journal()?;
         writer.show();
+        tracing::info!(batches = batch, journal = messages, took = ?start.elapsed(), "the raw log is taken again");
         Ok(writer)
     }
 
@@ -132,7 +135,7 @@ impl Writer {
     fn restore_hub(&mut self, journal: Journal) -> Vec<Change> {
         let mut station = self.station.write().expect("no holder panics");
         let changes = station.flush();
-        let product = |start| station.product(start).copied();
+        let product = |start| station.product(start).cloned();
         self.hub.restore(journal.entries, journal.told, journal.numbered_through, product);
         changes
     }
@@ -422,8 +425,8 @@ fn body(hub: &Hub, station: &Station, change: Change) -> Option<Body> {
     match change {
         Change::Window { product, .. } => match hub.told_revision(product.start) {
             Some(revision) if revision == product.revision => None,
-            Some(revision) => Some(Body::Supersede(*product, Some(revision))),
-            None => Some(Body::Window(*product)),
+            Some(revision) => Some(Body::Supersede(product, Some(revision))),
+            None => Some(Body::Window(product)),
         },
         Change::Raw(record) => Some(Body::Second(record)),
         change => whole(station, &change).map(|(topic, clock, json)| Body::Told { topic, clock, json }),
@@ -437,7 +440,9 @@ fn whole(station: &Station, change: &Change) -> Option<(Topic, Clock, String)> {
         Change::Window { .. } | Change::Raw(_) => None,
         Change::Gap { from, to } => Some((Topic::Window, *from, members("gap", &Gap::new(&mission, *from, *to)))),
         Change::Event(event) => Some((Topic::Event, event.clock, members("event", &EventWire::new(&mission, event)))),
-        Change::Anomaly(anomaly) => Some((Topic::Anomaly, anomaly.from, members("anomaly", &AnomalyWire::new(anomaly)))),
+        Change::Anomaly(anomaly) => {
+            Some((Topic::Anomaly, anomaly.from, members("anomaly", &AnomalyWire::new(anomaly))))
+        }
         Change::Calibration { known_since, .. } => {
             let json = station.calibration().map(version_json)?;
             Some((Topic::Calibration, *known_since, members("calibration", &json)))
@@ -467,6 +472,7 @@ fn picture(station: &Station) -> Picture {
         calibration: station.calibration().map_or(0, |calibration| calibration.version),
         events: station.events().count() as u64,
         anomalies: station.derived().anomalies.len() as u64,
+        settled: station.is_settled(),
     }
 }
 

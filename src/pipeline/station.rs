@@ -1,6 +1,7 @@
 //! The pipeline as one state machine: frames in, changes out, products at any time.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use super::archive::{Addition, Archive, cell_of};
 use super::calibration::{self, Anomaly, Calibration, Derived, KnownCalibration};
@@ -23,7 +24,7 @@ pub enum Change {
     /// A window's product, and the revision it takes the place of.
     Window {
         /// The product.
-        product: Box<Product>,
+        product: Arc<Product>,
         /// The revision announced before, if any.
         supersedes: Option<Revision>,
     },
@@ -59,7 +60,8 @@ pub struct Station {
     ledger: Ledger,
     derived: Derived,
     windows: BTreeMap<i64, Window>,
-    products: BTreeMap<i64, Product>,
+    /// Shared with those who are told of them.
+    products: BTreeMap<i64, Arc<Product>>,
     /// Cells with new samples.
     touched: BTreeSet<i64>,
     /// Whether anything that calibration depends on is new.
@@ -239,6 +241,11 @@ impl Station {
         self.calibration_touched
     }
 
+    /// Whether everything taken is in the products and was told.
+    pub fn is_settled(&self) -> bool {
+        self.touched.is_empty() && self.unannounced.is_empty() && !self.calibration_touched && !self.checks_touched
+    }
+
     fn bring_up(&mut self, calibrating: bool) -> Vec<Change> {
         let touched = self.recompute_windows();
         let calibration_changed = calibrating && self.recompute_calibration();
@@ -310,18 +317,20 @@ impl Station {
             if self.announced.get(&cell) != Some(&product.revision) {
                 self.unannounced.insert(cell);
             }
-            self.products.insert(cell, product);
+            self.products.insert(cell, Arc::new(product));
         }
     }
 
     fn announce(&mut self, cells: Vec<i64>) -> Vec<Change> {
         let mut changes = std::mem::take(&mut self.waiting);
+        // Seconds in order of time, whichever way the tape ran: whoever keeps note of them needs one entry a run.
+        changes.sort_by_key(|change| if let Change::Raw(record) = change { Some(record.clock) } else { None });
         for cell in cells {
             self.unannounced.remove(&cell);
             let Some(product) = self.products.get(&cell) else { continue };
             let supersedes = self.announced.insert(cell, product.revision);
             if supersedes != Some(product.revision) {
-                changes.push(Change::Window { product: Box::new(*product), supersedes });
+                changes.push(Change::Window { product: product.clone(), supersedes });
             }
         }
         changes
@@ -354,11 +363,11 @@ impl Station {
 
     /// Products in order of their windows.
     pub fn products(&self) -> impl DoubleEndedIterator<Item = &Product> {
-        self.products.values()
+        self.products.values().map(Arc::as_ref)
     }
 
     /// The product of a window.
-    pub fn product(&self, start: Clock) -> Option<&Product> {
+    pub fn product(&self, start: Clock) -> Option<&Arc<Product>> {
         self.products.get(&cell_of(start)).filter(|product| product.start == start)
     }
 
@@ -370,12 +379,12 @@ impl Station {
         } else {
             0..0
         };
-        self.products.range(cells).map(|(_, product)| product)
+        self.products.range(cells).map(|(_, product)| product.as_ref())
     }
 
     /// The latest product with an acceleration.
     pub fn latest(&self) -> Option<&Product> {
-        self.products.values().rev().find(|product| product.acceleration.is_some())
+        self.products().rev().find(|product| product.acceleration.is_some())
     }
 
     /// The uncalibrated windows, in order.
