@@ -22,7 +22,7 @@ use crate::telemetry::AccRecord;
 use crate::units::Clock;
 use journal::Entry;
 pub use message::{Body, Message, Topic, Topics};
-pub use reader::{Reader, Step};
+pub use reader::{History, Reader, Step};
 use told::Told;
 
 /// Messages published under one hold of the lock, so that readers wait for milliseconds at most.

@@ -46,7 +46,7 @@ fn main() -> ExitCode {
         Command::Challenge(args) => command::challenge::run(args),
     };
     done.unwrap_or_else(|error| {
-        eprintln!("oare: {error:#}");
+        eprintln!("oare: {}", command::told_once(&error));
         command::failed()
     })
 }

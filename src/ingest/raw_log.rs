@@ -13,7 +13,8 @@ use std::sync::{Mutex, RwLock};
 use redb::{Database, ReadableDatabase, TableDefinition};
 use sha2::{Digest, Sha256};
 
-use super::batch::{self, Stored};
+use super::batch;
+pub use super::batch::Stored;
 use crate::hub::journal;
 use crate::hub::told::{self, Told};
 use crate::ingest::wire::{Arrival, FrameId, Verdict};
@@ -231,27 +232,29 @@ impl RawLog {
         Ok(())
     }
 
-    /// Reads the whole log in order, one batch at a time, and notes which frames are known.
+    /// Reads the whole log in order, one batch at a time, and notes which frames are known. Repeats come without their octets: see
+    /// [`RawLog::resolve`].
     ///
     /// # Errors
-    /// When the file cannot be read or a batch is damaged; what came before has been handed on.
-    pub fn replay(&self, mut hand_on: impl FnMut(u64, Vec<Entry>)) -> Result<(), StoreError> {
+    /// When the file cannot be read or a batch is damaged; what came before has been handed on. And what `hand_on` says.
+    pub fn replay(
+        &self,
+        mut hand_on: impl FnMut(u64, Vec<Stored>) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
         let mut number = 0;
-        while let Some(stored) = self.stored_batch(number)? {
-            let mut entries = Vec::new();
-            for stored in stored {
+        while let Some(entries) = self.stored_batch(number)? {
+            for stored in &entries {
                 if let Stored::Entry(
                     Entry::Arrival { arrival: Arrival { verdict: Verdict::Good(id), octets, .. }, .. },
                     offset,
-                ) = &stored
+                ) = stored
                 {
                     let digest = Sha256::digest(octets)[..16].try_into().expect("a digest has 32 octets");
                     let place = Place { batch: number, offset: *offset };
                     self.known.lock().expect("no holder panics").insert((*id, digest), place);
                 }
-                entries.push(self.resolve(stored)?);
             }
-            hand_on(number, entries);
+            hand_on(number, entries)?;
             number += 1;
             self.batches.fetch_max(number, Ordering::Release);
         }
@@ -296,12 +299,11 @@ impl RawLog {
         }
     }
 
-    /// An entry with its frame, from the first copy where it is only referred to.
-    fn resolve(&self, stored: Stored) -> Result<Entry, StoreError> {
-        let (playback, mut arrival, place) = match stored {
-            Stored::Entry(entry, _) => return Ok(entry),
-            Stored::Repeat { playback, arrival, place } => (playback, arrival, place),
-        };
+    /// A repeated arrival with its octets, from the first copy.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or the first copy is not where it should be.
+    pub fn resolve(&self, mut arrival: Arrival, place: Place) -> Result<Arrival, StoreError> {
         let octets = self.recent_batch(place.batch)?;
         let damaged = || StoreError::Damaged {
             number: place.batch,
@@ -309,7 +311,7 @@ impl RawLog {
             found: "a repeat refers to it, and no frame begins there".into(),
         };
         arrival.octets = batch::frame_at(&octets, place.offset).ok_or_else(damaged)?.to_vec();
-        Ok(Entry::Arrival { playback, arrival })
+        Ok(arrival)
     }
 
     fn recent_batch(&self, number: u64) -> Result<std::sync::Arc<Vec<u8>>, StoreError> {

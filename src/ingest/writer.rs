@@ -12,7 +12,7 @@ use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
 use super::listener::Parts;
-use super::raw_log::{Entry, Journal, JournalPart, RawLog, StoreError};
+use super::raw_log::{Entry, Journal, JournalPart, RawLog, StoreError, Stored};
 use crate::hub::status::{Board, Phase, Picture, count};
 use crate::hub::wire::{AnomalyWire, EventWire, Gap, members};
 use crate::hub::{Body, Hub, Journaled, SampleSource, Topic};
@@ -85,14 +85,14 @@ impl Writer {
         let start = Instant::now();
         let journal = log.journal()?;
         let messages = journal.entries.len();
-        let mut orphans: HashMap<u32, (u64, u64)> = HashMap::new();
-        let (mut batch, mut playbacks) = (0, 0);
+        let mut batch = 0;
+        let mut orphans = Orphans { frame_octets: 0, open: HashMap::new(), next_playback: 0 };
         {
             let mut held = station.write().expect("no holder panics");
+            orphans.frame_octets = held.settings().link.frame_octets;
             held.announce_raw(journal.batches == 0);
             take_log(&log, &mut held, |station, number, entries| {
-                entries.iter().for_each(|entry| note_open(&mut orphans, entry));
-                playbacks = entries.iter().map(next_playback).fold(playbacks, u32::max);
+                entries.iter().for_each(|stored| orphans.note(stored));
                 batch = number + 1;
                 // What was told of already is not gathered again.
                 if number < journal.batches {
@@ -108,7 +108,7 @@ impl Writer {
             hub,
             board,
             batch,
-            next_playback: playbacks,
+            next_playback: orphans.next_playback,
             open: HashMap::new(),
             unjournaled: Journaled::default(),
             published: journal.batches,
@@ -116,11 +116,7 @@ impl Writer {
             calibrated: None,
         };
         let changes = writer.restore_hub(journal);
-        let mut closing: Vec<Entry> = orphans
-            .into_iter()
-            .map(|(playback, (from_bit, to_bit))| Entry::Closed { playback, bits: to_bit - from_bit })
-            .collect();
-        closing.sort_by_key(next_playback);
+        let closing = orphans.closing();
         writer.write(&closing, NUMBERS_AHEAD)?;
         writer.take(&closing);
         writer.publish_untold(changes);
@@ -282,7 +278,7 @@ impl Writer {
     /// The station takes a durable batch.
     fn take(&mut self, batch: &[Entry]) {
         let mut station = self.station.write().expect("no holder panics");
-        take_into(&mut station, batch);
+        batch.iter().for_each(|entry| take_entry(&mut station, entry));
     }
 
     /// Products of what was taken, and a new calibration where one is due.
@@ -385,12 +381,9 @@ pub fn rebuild(log: &RawLog, settings: &Settings) -> Result<Station, StoreError>
 fn take_log(
     log: &RawLog,
     station: &mut Station,
-    mut note: impl FnMut(&mut Station, u64, &[Entry]),
+    mut note: impl FnMut(&mut Station, u64, &[Stored]),
 ) -> Result<(), StoreError> {
-    log.replay(|number, batch| {
-        take_into(station, &batch);
-        note(station, number, &batch);
-    })?;
+    take_once(log, station, &mut note)?;
     set_aside(log, station, note).map(|_| ())
 }
 
@@ -398,25 +391,48 @@ fn take_log(
 fn set_aside(
     log: &RawLog,
     station: &mut Station,
-    mut note: impl FnMut(&mut Station, u64, &[Entry]),
+    mut note: impl FnMut(&mut Station, u64, &[Stored]),
 ) -> Result<bool, StoreError> {
     let Some(set_aside) = station.to_set_aside() else { return Ok(false) };
     tracing::warn!("good frames of one identity differ; the log is taken again with the ones seen more often");
     *station = Station::without(station.settings().clone(), None, set_aside);
-    log.replay(|number, batch| {
-        take_into(station, &batch);
-        note(station, number, &batch);
-    })?;
+    take_once(log, station, &mut note)?;
     Ok(true)
 }
 
-fn take_into(station: &mut Station, batch: &[Entry]) {
-    for entry in batch {
-        match entry {
-            Entry::Opened { playback } => station.open_playback(PlaybackId(*playback)),
-            Entry::Arrival { playback, arrival } => station.take(PlaybackId(*playback), arrival),
-            Entry::Closed { playback, bits } => station.close_playback(PlaybackId(*playback), *bits),
+fn take_once(
+    log: &RawLog,
+    station: &mut Station,
+    note: &mut impl FnMut(&mut Station, u64, &[Stored]),
+) -> Result<(), StoreError> {
+    log.replay(|number, batch| {
+        for stored in &batch {
+            take_stored(log, station, stored)?;
         }
+        note(station, number, &batch);
+        Ok(())
+    })
+}
+
+/// The octets of a repeat are read again only where the station cannot do without.
+fn take_stored(log: &RawLog, station: &mut Station, stored: &Stored) -> Result<(), StoreError> {
+    match stored {
+        Stored::Entry(entry, _) => take_entry(station, entry),
+        Stored::Repeat { playback, arrival, place } => {
+            let playback = PlaybackId(*playback);
+            if !station.take_repeat(playback, arrival) {
+                station.take(playback, &log.resolve(arrival.clone(), *place)?);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn take_entry(station: &mut Station, entry: &Entry) {
+    match entry {
+        Entry::Opened { playback } => station.open_playback(PlaybackId(*playback)),
+        Entry::Arrival { playback, arrival } => station.take(PlaybackId(*playback), arrival),
+        Entry::Closed { playback, bits } => station.close_playback(PlaybackId(*playback), *bits),
     }
 }
 
@@ -441,7 +457,7 @@ fn whole(station: &Station, change: &Change) -> Option<(Topic, Clock, String)> {
         Change::Gap { from, to } => Some((Topic::Window, *from, members("gap", &Gap::new(&mission, *from, *to)))),
         Change::Event(event) => Some((Topic::Event, event.clock, members("event", &EventWire::new(&mission, event)))),
         Change::Anomaly(anomaly) => {
-            Some((Topic::Anomaly, anomaly.from, members("anomaly", &AnomalyWire::new(anomaly))))
+            Some((Topic::Anomaly, anomaly.from, members("anomaly", &AnomalyWire::new(&mission, anomaly))))
         }
         Change::Calibration { known_since, .. } => {
             let json = station.calibration().map(version_json)?;
@@ -483,22 +499,46 @@ fn next_playback(entry: &Entry) -> u32 {
     }
 }
 
-/// Keeps the playbacks that a crash left open: from which bit of their stream to which.
-fn note_open(open: &mut HashMap<u32, (u64, u64)>, entry: &Entry) {
-    match entry {
-        Entry::Opened { playback } => {
-            open.insert(*playback, (0, 0));
-        }
-        Entry::Closed { playback, .. } => {
-            open.remove(playback);
-        }
-        Entry::Arrival { playback, arrival } => {
-            let end_bit = arrival.first_bit + arrival.octets.len() as u64 * 8;
-            let span = open.entry(*playback).or_insert((arrival.first_bit, end_bit));
-            if *span == (0, 0) {
-                *span = (arrival.first_bit, end_bit);
+/// Playbacks that a crash left open: from which bit of their stream to which.
+struct Orphans {
+    frame_octets: usize,
+    open: HashMap<u32, (u64, u64)>,
+    next_playback: u32,
+}
+
+impl Orphans {
+    fn note(&mut self, stored: &Stored) {
+        match stored {
+            Stored::Entry(Entry::Opened { playback }, _) => {
+                self.next_playback = self.next_playback.max(playback + 1);
+                self.open.insert(*playback, (0, 0));
             }
-            span.1 = span.1.max(end_bit);
+            Stored::Entry(Entry::Closed { playback, .. }, _) => {
+                self.open.remove(playback);
+            }
+            Stored::Entry(Entry::Arrival { playback, arrival }, _) => {
+                self.note_arrival(*playback, arrival.first_bit, arrival.octets.len());
+            }
+            Stored::Repeat { playback, arrival, .. } => {
+                self.note_arrival(*playback, arrival.first_bit, self.frame_octets);
+            }
         }
+    }
+
+    fn note_arrival(&mut self, playback: u32, first_bit: u64, octets: usize) {
+        let end_bit = first_bit + octets as u64 * 8;
+        let span = self.open.entry(playback).or_insert((first_bit, end_bit));
+        if *span == (0, 0) {
+            *span = (first_bit, end_bit);
+        }
+        span.1 = span.1.max(end_bit);
+    }
+
+    /// The ends of these playbacks, as far as their bits are known.
+    fn closing(self) -> Vec<Entry> {
+        let closed = |(playback, (from_bit, to_bit))| Entry::Closed { playback, bits: to_bit - from_bit };
+        let mut closing: Vec<Entry> = self.open.into_iter().map(closed).collect();
+        closing.sort_by_key(next_playback);
+        closing
     }
 }

@@ -157,6 +157,21 @@ impl Station {
         }
     }
 
+    /// As [`Station::take`], for a good frame known to be a repeat of one taken before, of which only the identity is at hand; false,
+    /// and nothing taken, where that does not tell which frame it is.
+    pub fn take_repeat(&mut self, id: PlaybackId, arrival: &Arrival) -> bool {
+        let Verdict::Good(frame) = arrival.verdict else { return false };
+        if !self.frames.add_repeat(id, frame) {
+            return false;
+        }
+        let playback = self.ledger.playback_mut(id);
+        playback.account.frames_found += 1;
+        playback.account.frames_repeated += 1;
+        playback.sense.get_or_insert(arrival.sense);
+        playback.bit_offset.get_or_insert((arrival.first_bit % 8) as u8);
+        true
+    }
+
     fn read_packets(&mut self, id: PlaybackId, frame: &TransferFrame<'_>) {
         let mut assembler = std::mem::take(&mut self.assembler);
         assembler.take(frame, |assembled| match assembled {
