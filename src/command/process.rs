@@ -11,6 +11,7 @@ use oare_ground::config::Config;
 use oare_ground::hub::{Body, Message};
 use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader, Verdict};
 use oare_ground::pipeline::calibration::KnownCalibration;
+use oare_ground::pipeline::report::report;
 use oare_ground::pipeline::station::replay;
 use oare_ground::pipeline::{PlaybackId, Station, files};
 use oare_ground::record::{mcap_file::Recording, mcap_reader};
@@ -28,6 +29,9 @@ pub struct Args {
     /// Configuration file; STS-65 without it.
     #[arg(long)]
     config: Option<PathBuf>,
+    /// Folder for a report: a page with accuracy tables, calibration and histories, its figures, and the tables as JSON.
+    #[arg(long)]
+    report: Option<PathBuf>,
     /// Known bias laws and scale factors, taken instead of estimating them.
     #[arg(long)]
     calibration: Option<PathBuf>,
@@ -68,6 +72,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let station = replay(&settings, known.as_ref(), |station| take_all(station, &streams));
     write_products(&station, &args.out)?;
     write_recording(&station, &streams, &args.out.join("recording.mcap"))?;
+    if let Some(folder) = &args.report {
+        write_report(&station, folder)?;
+    }
     summarise(&station, args.json)
 }
 
@@ -88,8 +95,9 @@ fn read_stream(path: &Path, link: LinkConfig) -> Result<Stream> {
     if !mcap_reader::is_mcap(&octets) {
         return Ok(Stream { link, octets });
     }
-    let octets = mcap_reader::dump(&octets).with_context(|| format!("cannot use {}", path.display()))?;
-    Ok(Stream { link: LinkConfig { randomised: false, reed_solomon_interleave: None, ..link }, octets })
+    let link = LinkConfig { randomised: false, reed_solomon_interleave: None, ..link };
+    let octets = mcap_reader::dump(&octets, &link).with_context(|| format!("cannot use {}", path.display()))?;
+    Ok(Stream { link, octets })
 }
 
 /// Reads every stream; parts come with the number of their playback.
@@ -133,7 +141,7 @@ fn write_recording(station: &Station, streams: &[Stream], path: &Path) -> Result
     });
     written.with_context(cannot)?;
     for (seq, product) in (1..).zip(station.products()) {
-        recording.message(&Message::new(seq, Body::Window(*product))).with_context(cannot)?;
+        recording.message(&Message::new(seq, Body::Window((*product).into()))).with_context(cannot)?;
     }
     recording.finish().with_context(cannot)?;
     Ok(())
@@ -150,6 +158,18 @@ fn write_products(station: &Station, out: &Path) -> Result<()> {
     write("calibration.json", pretty(&files::calibration_json(station))?)?;
     write("anomalies.json", pretty(&files::anomalies_json(station))?)?;
     write("ledger.json", pretty(&files::ledger_json(station))?)
+}
+
+fn write_report(station: &Station, folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let write = |name: &str, text: &str| {
+        let path = folder.join(name);
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+    };
+    let report = report(station);
+    write("index.html", &report.html)?;
+    write("accuracy.json", &(serde_json::to_string_pretty(&report.accuracy)? + "\n"))?;
+    report.figures.iter().try_for_each(|(name, svg)| write(name, svg))
 }
 
 /// Tells what was taken in, and what could not be used.

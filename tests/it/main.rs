@@ -5,6 +5,7 @@ mod bad_input;
 mod dashboard;
 mod layering;
 mod live;
+mod replay;
 mod samples;
 mod service_support;
 mod station;
