@@ -70,8 +70,7 @@ fn write(out: &Path, folders: &[PathBuf], draws: Vec<Outcome>, score: Score) -> 
     let progress: ProgressBar = bar(orders.len(), "whole cases");
     let one = |(folder, with): &(&PathBuf, Vec<String>)| {
         let (case, files) = real::read(folder, with)?;
-        let (answer, plates) =
-            measured::analyse(&case, &files).with_context(|| folder.display().to_string())?;
+        let (answer, plates) = measured::analyse(&case, &files).with_context(|| folder.display().to_string())?;
         let with = if with.is_empty() { "as it stands".to_owned() } else { with.join(", ") };
         progress.inc(1);
         anyhow::Ok((Whole { with, answer }, plates))

@@ -57,12 +57,7 @@ impl Evidence {
         let _ = writeln!(page, "<p>{LIMITS}</p>");
         self.lot(&mut page);
         for (whole, plates) in self.cases.iter().zip(plates) {
-            let _ = writeln!(
-                page,
-                "<h2 class=\"case\">{}, {}</h2>",
-                escaped(&whole.answer.case),
-                escaped(&whole.with)
-            );
+            let _ = writeln!(page, "<h2 class=\"case\">{}, {}</h2>", escaped(&whole.answer.case), escaped(&whole.with));
             page.push_str(&page::section(&whole.answer, plates, "h3"));
         }
         self.table(&mut page);

@@ -67,7 +67,8 @@ fn series(axes: &[SeriesPlate]) -> Drawn {
             let points = |y: &[f64]| -> Vec<(f64, f64)> {
                 axis.t_s.iter().zip(y).map(|(t, y)| (hours(*t), y * scale)).collect()
             };
-            let dots = |y: &[f64], colour: RGBColor| points(y).into_iter().map(move |p| Circle::new(p, 1, colour.filled()));
+            let dots =
+                |y: &[f64], colour: RGBColor| points(y).into_iter().map(move |p| Circle::new(p, 1, colour.filled()));
             chart.draw_series(dots(&axis.before, GREY)).map_err(said)?;
             if axis.after != axis.before {
                 chart.draw_series(dots(&axis.after, AFTER)).map_err(said)?;
@@ -135,9 +136,7 @@ fn ladder(plate: &OrbitPlate) -> Drawn {
             chart.draw_series(LineSeries::new(line, colour)).map_err(said)?;
             if odd {
                 let end = (levels as f64 - 0.97, plate.rms_m[levels - 1][arc].log10());
-                chart
-                    .draw_series([Text::new(plate.arcs[arc].clone(), end, text(12).color(&CLAIM))])
-                    .map_err(said)?;
+                chart.draw_series([Text::new(plate.arcs[arc].clone(), end, text(12).color(&CLAIM))]).map_err(said)?;
             }
         }
         let middle = |k: usize| median(plate.rms_m[k].iter().copied()).max(1e-6).log10();
@@ -181,9 +180,7 @@ fn arcs(plate: &OrbitPlate) -> Drawn {
             let x = k as f64;
             let (was, is) = (first[k].max(1e-6).log10(), last[k].max(1e-6).log10());
             let colour = if last[k] > plate.rms_max_m { CLAIM } else { AFTER };
-            chart
-                .draw_series(LineSeries::new([(x, was), (x, is)], GREY.mix(0.4).stroke_width(1)))
-                .map_err(said)?;
+            chart.draw_series(LineSeries::new([(x, was), (x, is)], GREY.mix(0.4).stroke_width(1))).map_err(said)?;
             chart.draw_series([Circle::new((x, was), 3, GREY.filled())]).map_err(said)?;
             chart.draw_series([Circle::new((x, is), 4, colour.filled())]).map_err(said)?;
             if k % every == 0 {

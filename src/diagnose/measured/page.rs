@@ -8,7 +8,7 @@ use super::answer::{ArcAnswer, Effect};
 use super::{Answer, Plates, figures};
 use crate::diagnose::answer::{ParameterAnswer, Verdict};
 use crate::diagnose::report::Report;
-pub use crate::diagnose::report::page::STYLE;
+pub(crate) use crate::diagnose::report::page::STYLE;
 use crate::diagnose::report::page::{escaped, figure_of, probability, table, verdict_word};
 use crate::diagnose::report::sentence::words;
 
@@ -111,7 +111,9 @@ fn lower_first(name: &str) -> String {
     // A lone capital is a symbol.
     let mut letters = name.chars();
     match (letters.next(), letters.as_str()) {
-        (Some(first), rest) if rest.starts_with(char::is_lowercase) => first.to_lowercase().chain(rest.chars()).collect(),
+        (Some(first), rest) if rest.starts_with(char::is_lowercase) => {
+            first.to_lowercase().chain(rest.chars()).collect()
+        }
         _ => name.to_owned(),
     }
 }
@@ -127,7 +129,7 @@ fn listed(names: &[String]) -> String {
 /// Three significant digits, with an exponent only where there must be one.
 pub fn number(x: f64) -> String {
     match x.abs() {
-        a if a == 0.0 => "0".to_owned(),
+        0.0 => "0".to_owned(),
         a if !a.is_finite() => "-".to_owned(),
         a if !(1e-4..1e5).contains(&a) => format!("{x:.2e}"),
         a => format!("{x:.*}", (2.0 - a.log10().floor()).clamp(0.0, 6.0) as usize),
@@ -172,7 +174,8 @@ fn predicts(out: &mut String, answer: &Answer) {
             vec![added, number(step.rms), predicted, score]
         });
         let unit = &answer.unit;
-        let heads = ["added", &format!("#rms of the fit, {unit}"), &format!("#rms of data not fitted, {unit}"), "#evidence"];
+        let heads =
+            ["added", &format!("#rms of the fit, {unit}"), &format!("#rms of data not fitted, {unit}"), "#evidence"];
         table(out, &heads, rows);
     }
     let Some(held) = &answer.fit.held_out else {

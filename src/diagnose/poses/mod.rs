@@ -329,9 +329,7 @@ fn zero(case: &MeasuredCase, poses: &[Pose]) -> Result<f64, MeasuredError> {
         return Ok(zero);
     }
     let range = |axis: usize| {
-        poses
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.mean[axis]), h.max(p.mean[axis])))
+        poses.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.mean[axis]), h.max(p.mean[axis])))
     };
     let middle = (0..3).map(range).map(|(low, high)| 0.5 * (low + high)).sum::<f64>() / 3.0;
     let half = (0..3).map(range).map(|(low, high)| 0.5 * (high - low)).fold(0.0, f64::max);

@@ -63,10 +63,15 @@ fn diagnosed(text: String, unit: &str) -> Answer {
 
 #[test]
 fn an_ideal_triad_lacks_nothing_whatever_its_unit() {
-    for (seed, (zero, per, unit)) in
-        [(0.0, 1.0, "m_s2"), (0.0, 1.0 / G, "g"), (32_768.0, 400.0, "counts"), (2_048.0, 20.0, "counts"), (0.0, 1670.0, "lsb")]
-            .into_iter()
-            .enumerate()
+    for (seed, (zero, per, unit)) in [
+        (0.0, 1.0, "m_s2"),
+        (0.0, 1.0 / G, "g"),
+        (32_768.0, 400.0, "counts"),
+        (2_048.0, 20.0, "counts"),
+        (0.0, 1670.0, "lsb"),
+    ]
+    .into_iter()
+    .enumerate()
     {
         let mut rng = ChaCha12Rng::seed_from_u64(seed as u64);
         let answer = diagnosed(Truth::ideal(zero, per).rows(24, 0.01, &mut rng), unit);

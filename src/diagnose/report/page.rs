@@ -6,7 +6,7 @@ use super::Plates;
 use super::sentence::{figure, sentence, words};
 use crate::diagnose::answer::{Diagnosis, EffectAnswer, Verdict};
 
-pub(in crate::diagnose) const STYLE: &str = "
+pub(crate) const STYLE: &str = "
 :root { --ink: #222; --soft: #666; --rule: #d5d5d5; --claim: #b23a2e; }
 * { box-sizing: border-box; }
 body { font: 15px/1.5 Georgia, 'Times New Roman', serif; color: var(--ink); max-width: 1020px; margin: 2.2em auto; padding: 0 1.2em; }

@@ -27,7 +27,9 @@ pub enum PadError {
         found: String,
     },
     /// The data are not whole samples.
-    #[error("PAD data: expected a multiple of {SAMPLE_BYTES} bytes (time, x, y, z as 32-bit floats), found {found} bytes")]
+    #[error(
+        "PAD data: expected a multiple of {SAMPLE_BYTES} bytes (time, x, y, z as 32-bit floats), found {found} bytes"
+    )]
     Length {
         /// Bytes there.
         found: usize,
@@ -119,7 +121,7 @@ impl Pad {
     /// From the header's text and the data's bytes.
     pub fn read(xml: &str, data: &[u8]) -> Result<Self, PadError> {
         let header = PadHeader::parse(xml)?;
-        if data.len() % SAMPLE_BYTES != 0 {
+        if !data.len().is_multiple_of(SAMPLE_BYTES) {
             return Err(PadError::Length { found: data.len() });
         }
         let mut samples: Vec<PadSample> = Vec::with_capacity(data.len() / SAMPLE_BYTES);
