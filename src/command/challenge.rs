@@ -31,6 +31,9 @@ pub struct Args {
     /// Draw from the real recordings below this folder instead of simulated ones.
     #[arg(long)]
     real: Option<PathBuf>,
+    /// With `--real`: diagnose the cases whole too, and write the evidence as a page here.
+    #[arg(long, requires = "real")]
+    report: Option<PathBuf>,
     /// Bootstrap replicates per case; without them the table of nulls decides.
     #[arg(long, default_value_t = 0)]
     bootstrap: usize,
@@ -51,7 +54,7 @@ pub struct Args {
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(dir) = &args.real {
-        return super::challenge_real::run(dir, args.cases, args.seed, args.out.as_deref());
+        return super::challenge_real::run(dir, args.cases, args.seed, args.report.as_deref().or(args.out.as_deref()));
     }
     let engine = Engine { bootstraps: args.bootstrap, seed: args.seed };
     let outcomes = match &args.open {

@@ -12,8 +12,9 @@ use rayon::prelude::*;
 
 use super::challenge::bar;
 
-/// Draw, analyse, reveal, score; with `out`, diagnose the cases whole and write the evidence.
+/// Draw, analyse, reveal, score, and say how long it took; with `out`, diagnose the cases whole and write the evidence.
 pub fn run(dir: &Path, draws: usize, seed: u64, out: Option<&Path>) -> anyhow::Result<ExitCode> {
+    let started = std::time::Instant::now();
     let folders = real::folders(dir);
     if folders.is_empty() {
         eprintln!("SKIPPED: no real recordings below {}", dir.display());
@@ -44,6 +45,8 @@ pub fn run(dir: &Path, draws: usize, seed: u64, out: Option<&Path>) -> anyhow::R
     if let Some(out) = out {
         write(out, &folders, outcomes, score)?;
     }
+    let threads = rayon::current_num_threads();
+    println!("{:.0} s on {threads} threads, seed {seed}", started.elapsed().as_secs_f64());
     Ok(super::DONE)
 }
 

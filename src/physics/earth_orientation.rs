@@ -16,12 +16,14 @@ const ARCSEC_RAD: f64 = std::f64::consts::PI / 648_000.0;
 const MJD0_JD: f64 = 2_400_000.5;
 /// Precession-nutation is tabulated at this spacing; its shortest term has a period of days.
 const TABLE_STEP_S: f64 = 7_200.0;
+/// Rows further apart than this are no daily table: the pole is then 1 mas off, a decimetre at a GPS orbit.
+const HOLE_DAYS: f64 = 2.5;
 
 /// Earth orientation that cannot be used.
 #[derive(Debug, Error, PartialEq)]
 pub enum EarthOrientationError {
     /// A line of the table does not hold six numbers.
-    #[error("Earth orientation line {line}: expected mjd_utc, xp, yp, UT1-UTC, dx, dy, found {found:?}")]
+    #[error("line {line}: expected mjd_utc, xp, yp, UT1-UTC, dx, dy, found {found:?}")]
     Line {
         /// Line number, from 1.
         line: usize,
@@ -40,6 +42,16 @@ pub enum EarthOrientationError {
         /// First day of the table.
         from: f64,
         /// Last day of the table.
+        to: f64,
+        /// The day asked for.
+        wanted: f64,
+    },
+    /// The table has a hole where it is needed.
+    #[error("Earth orientation has no row between MJD {from} and {to}, and MJD {wanted:.3} is needed")]
+    Hole {
+        /// Last day before the hole.
+        from: f64,
+        /// First day after it.
         to: f64,
         /// The day asked for.
         wanted: f64,
@@ -115,8 +127,9 @@ impl EarthOrientation {
     pub fn from_csv(text: &str) -> Result<Self, EarthOrientationError> {
         let mut rows = Vec::new();
         for (i, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.trim().is_empty()) {
-            let fields: Vec<f64> = line.split(',').filter_map(|f| f.trim().parse().ok()).collect();
-            let &[mjd_utc, xp, yp, ut1_utc, dx, dy] = fields.as_slice() else {
+            let fields: Option<Vec<f64>> = line.split(',').map(|f| f.trim().parse().ok()).collect();
+            let finite = fields.filter(|fields| fields.iter().all(|x: &f64| x.is_finite())).unwrap_or_default();
+            let &[mjd_utc, xp, yp, ut1_utc, dx, dy] = finite.as_slice() else {
                 return Err(EarthOrientationError::Line { line: i + 1, found: line.to_owned() });
             };
             let ut1_tai = ut1_utc - tai_minus_utc_s(mjd_utc)?;
@@ -139,6 +152,12 @@ impl EarthOrientation {
         }
         let width = self.rows.len().min(4);
         let after = self.rows.partition_point(|row| row.mjd_utc <= mjd_utc);
+        if after > 0 && after < self.rows.len() {
+            let (from, to) = (self.rows[after - 1].mjd_utc, self.rows[after].mjd_utc);
+            if to - from > HOLE_DAYS {
+                return Err(EarthOrientationError::Hole { from, to, wanted: mjd_utc });
+            }
+        }
         let start = after.saturating_sub(width / 2).min(self.rows.len() - width);
         let used = &self.rows[start..start + width];
         let nodes: Vec<f64> = used.iter().map(|row| row.mjd_utc).collect();

@@ -15,8 +15,22 @@ pub const DEGREE_MAX: usize = 120;
 #[derive(Debug, Error)]
 pub enum GravityFieldError {
     /// The file is not a usable `.gfc`.
-    #[error("gravity field: {0}")]
+    #[error("{0}")]
     File(#[from] GfcError),
+    /// A coefficient is not a number.
+    #[error("the coefficients of degree {degree} and order {order} are not finite")]
+    NotFinite {
+        /// Degree.
+        degree: usize,
+        /// Order.
+        order: usize,
+    },
+    /// The file ends before its last record.
+    #[error("the file announces degree {degree}, and its record of degree and order {degree} is missing")]
+    CutShort {
+        /// The degree announced.
+        degree: usize,
+    },
 }
 
 /// A gravity field at one epoch.
@@ -38,7 +52,25 @@ impl GravityField {
     /// Read a `.gfc` and bring its time-variable terms to a modified Julian date.
     pub fn from_gfc(text: &str, mjd: f64) -> Result<Self, GravityFieldError> {
         let years = 2000.0 + (mjd - 51_544.5) / 365.25;
-        Ok(Self::from_coefficients(&read_gfc(text)?.model.at(years)))
+        let model = read_gfc(text)?.model.at(years);
+        let degree = model.max_degree();
+        let orders = || (0..=degree).flat_map(|n| (0..=n).map(move |m| (n, m)));
+        if let Some((degree, order)) =
+            orders().find(|&(n, m)| !(model.c(n, m).is_finite() && model.s(n, m).is_finite()))
+        {
+            return Err(GravityFieldError::NotFinite { degree, order });
+        }
+        let last = degree.to_string();
+        let is_last = |line: &str| {
+            let mut words = line.split_whitespace();
+            words.next().is_some_and(|key| key.starts_with("gfc"))
+                && words.next() == Some(&last)
+                && words.next() == Some(&last)
+        };
+        if degree > 0 && !text.lines().rev().any(is_last) {
+            return Err(GravityFieldError::CutShort { degree });
+        }
+        Ok(Self::from_coefficients(&model))
     }
 
     /// From fully normalised coefficients.

@@ -24,7 +24,7 @@ const ALL: [&str; 6] = ["gravity:12", "sun", "moon", "solar_radiation_pressure",
 const GPS_HEIGHT_M: f64 = 20_200e3;
 
 /// A field of degree 12 by Kaula's rule, with the Earth's own flattening.
-fn field() -> String {
+pub fn field() -> String {
     let mut rng = ChaCha12Rng::seed_from_u64(1);
     let mut text = String::from(
         "product_type gravity_field\nmodelname made\nearth_gravity_constant 0.3986004415E+15\nradius 6378136.3\nmax_degree 12\n\
@@ -42,7 +42,7 @@ fn field() -> String {
 }
 
 /// Made Earth orientation for a week round a day.
-fn orientation(mjd: f64) -> String {
+pub fn orientation(mjd: f64) -> String {
     let mut text = String::from("mjd_utc,xp_arcsec,yp_arcsec,ut1_minus_utc_s,dx_mas,dy_mas\n");
     for day in -3..=4 {
         let d = f64::from(day);
@@ -72,30 +72,30 @@ fn circular(height_m: f64, inclination_deg: f64, node_deg: f64, latitude_deg: f6
     State { r: (towards * u.cos() + across * u.sin()) * r, v: (across * u.cos() - towards * u.sin()) * speed }
 }
 
-struct Satellite {
+pub struct Satellite {
     id: &'static str,
     start: State,
     terms: Vec<(Term, [f64; 2])>,
     kick: Option<Impulse>,
 }
 
-fn gps(id: &'static str, node_deg: f64, latitude_deg: f64) -> Satellite {
+pub fn gps(id: &'static str, node_deg: f64, latitude_deg: f64) -> Satellite {
     let start = circular(GPS_HEIGHT_M, 55.0, node_deg, latitude_deg);
     let terms = vec![(Term::SolarRadiation, [9.3e-8, 0.0]), (Term::YBias, [4e-10, 0.0]), (Term::BBias, [-6e-10, 0.0])];
     Satellite { id, start, terms, kick: None }
 }
 
 /// A recording of some satellites.
-struct Made {
+pub struct Made {
     /// Date of the first epoch.
-    date: (i32, u32, u32),
-    spacing_s: f64,
-    hours: f64,
-    satellites: Vec<Satellite>,
+    pub date: (i32, u32, u32),
+    pub spacing_s: f64,
+    pub hours: f64,
+    pub satellites: Vec<Satellite>,
 }
 
 impl Made {
-    fn sp3(&self) -> String {
+    pub fn sp3(&self) -> String {
         let (year, month, day) = self.date;
         let origin = GpsInstant::from_calendar(year, month, day, 0.0).expect("a date");
         let eop = EarthOrientation::from_csv(&orientation(origin.mjd)).expect("orientation");
@@ -306,7 +306,7 @@ fn what_cannot_be_used_is_told_in_one_sentence() {
     );
     let other_day = sp3.replace("*  2015", "*  1999");
     assert!(
-        said(other_day, &ALL).starts_with("Earth orientation covers MJD"),
+        said(other_day, &ALL).starts_with("eop.csv: Earth orientation covers MJD"),
         "{}",
         said(sp3.replace("*  2015", "*  1999"), &ALL)
     );

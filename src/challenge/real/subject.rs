@@ -94,8 +94,7 @@ fn orbits(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Vec<S
 }
 
 fn pose_sets(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Vec<Subject>, MeasuredError> {
-    let gravity =
-        case.number("recording.gravity_m_s2")?.ok_or_else(|| case.wrong("recording.gravity_m_s2", "a number"))?;
+    let gravity = poses_room::gravity(case)?;
     let all = poses_room::poses(case, files)?;
     let every = |from: usize, step: usize| all.iter().skip(from).step_by(step).copied().collect::<Vec<Pose>>();
     let mut sets = vec![("all poses", all.clone()), ("even poses", every(0, 2)), ("odd poses", every(1, 2))];

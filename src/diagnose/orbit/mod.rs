@@ -20,8 +20,7 @@ use crate::physics::gravity_field::{GravityField, GravityFieldError};
 
 const POSITION_SIGMA_M: f64 = 0.025;
 /// What the simulation may include, as the case format names it.
-pub const INCLUDES: &str =
-    "gravity:<degree>, sun, moon, solar_radiation_pressure, srp_y_bias, srp_b_bias, srp_once_per_rev";
+pub const INCLUDES: &str = "gravity:<degree>, sun, moon, relativity, solar_radiation_pressure, srp_y_bias, srp_b_bias, srp_once_per_rev, aerodynamic_drag";
 
 /// An orbit case that cannot be analysed.
 #[derive(Debug, Error)]
@@ -61,11 +60,31 @@ pub enum OrbitError {
         found: String,
     },
     /// Earth orientation.
-    #[error(transparent)]
-    EarthOrientation(#[from] EarthOrientationError),
+    #[error("{file}: {source}")]
+    EarthOrientation {
+        /// File name.
+        file: String,
+        /// What is wrong in it.
+        source: EarthOrientationError,
+    },
     /// Gravity field.
-    #[error(transparent)]
-    Gravity(#[from] GravityFieldError),
+    #[error("{file}: {source}")]
+    Gravity {
+        /// File name.
+        file: String,
+        /// What is wrong in it.
+        source: GravityFieldError,
+    },
+    /// The simulation claims more degrees than its field has.
+    #[error("simulation.includes: gravity:{claimed} is more than the field {file} holds, degree {held}")]
+    Degree {
+        /// File name.
+        file: String,
+        /// What `includes` says.
+        claimed: usize,
+        /// The field's degree.
+        held: usize,
+    },
 }
 
 /// Analyse an orbit case.
@@ -82,18 +101,24 @@ pub fn problem(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<
         .ok_or_else(|| case.wrong("recording.files", "a list of SP3 files"))?;
     let sp3: Vec<(String, String)> = names.iter().map(|name| (name.clone(), files[name].clone())).collect();
     let recording = sp3::Recording::read(&sp3)?;
-    let eop = EarthOrientation::from_csv(&files[&case.text("recording.eop")?]).map_err(OrbitError::from)?;
+    let (eop_name, field_name) = (case.text("recording.eop")?, case.text("recording.gravity")?);
+    let of_eop = |source| OrbitError::EarthOrientation { file: eop_name.clone(), source };
+    let eop = EarthOrientation::from_csv(&files[&eop_name]).map_err(of_eop)?;
     let middle_mjd = recording.origin.mjd + (recording.origin.s + 0.5 * recording.span_s()) / 86_400.0;
-    let gravity = &files[&case.text("recording.gravity")?];
-    let field = GravityField::from_gfc(gravity, middle_mjd).map_err(OrbitError::from)?;
-    let environment = Environment::new(recording.origin, recording.span_s(), &eop, field).map_err(OrbitError::from)?;
+    let field = GravityField::from_gfc(&files[&field_name], middle_mjd)
+        .map_err(|source| OrbitError::Gravity { file: field_name.clone(), source })?;
+    let baseline = baseline(case)?;
+    if baseline.degree > field.degree() {
+        return Err(OrbitError::Degree { file: field_name, claimed: baseline.degree, held: field.degree() }.into());
+    }
+    let environment = Environment::new(recording.origin, recording.span_s(), &eop, field).map_err(of_eop)?;
     let fit_s = case.number("recording.fit_hours")?.map_or(f64::INFINITY, |h| h * 3600.0);
     let sigma_m = case.number("recording.position_sigma_m")?.unwrap_or(POSITION_SIGMA_M);
     if sigma_m <= 0.0 {
         return Err(case.wrong("recording.position_sigma_m", "a number above zero"));
     }
     let wanted = wanted(case)?;
-    let (mut arcs, mut left_out) = (Vec::new(), Vec::new());
+    let (mut arcs, mut left_out) = (Vec::new(), recording.cut_short.clone());
     for track in &recording.tracks {
         if wanted.as_ref().is_none_or(|ids| ids.contains(&track.id)) {
             match Arc::new(track, &environment, fit_s) {
@@ -108,7 +133,7 @@ pub fn problem(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<
         let what = wanted.map_or("a satellite".to_owned(), |ids| format!("any of the satellites {}", ids.join(", ")));
         return Err(OrbitError::Empty { what }.into());
     }
-    Ok(Problem { environment, baseline: baseline(case)?, arcs, sigma_m, left_out })
+    Ok(Problem { environment, baseline, arcs, sigma_m, left_out })
 }
 
 fn wanted(case: &MeasuredCase) -> Result<Option<Vec<String>>, MeasuredError> {
@@ -130,6 +155,8 @@ pub fn baseline(case: &MeasuredCase) -> Result<Baseline, MeasuredError> {
             (_, Some(Ok(degree))) => baseline.degree = degree,
             ("sun", _) => baseline.known.push(Term::Sun),
             ("moon", _) => baseline.known.push(Term::Moon),
+            // Always in: too small to be told from what is unlisted.
+            ("relativity", _) => {}
             ("solar_radiation_pressure", _) => baseline.estimated.push(Term::SolarRadiation),
             ("srp_y_bias", _) => baseline.estimated.push(Term::YBias),
             ("srp_b_bias", _) => baseline.estimated.push(Term::BBias),

@@ -42,6 +42,8 @@ pub struct Recording {
     pub origin: GpsInstant,
     /// The satellites, by name.
     pub tracks: Vec<Track>,
+    /// Files that hold fewer epochs than their first line announces, in words.
+    pub cut_short: Vec<String>,
 }
 
 impl Recording {
@@ -49,14 +51,20 @@ impl Recording {
     pub fn read(files: &[(String, String)]) -> Result<Self, OrbitError> {
         let mut satellites: BTreeMap<String, BTreeMap<i64, Found>> = BTreeMap::new();
         let mut origin: Option<GpsInstant> = None;
+        let mut cut_short = Vec::new();
         for (name, text) in files {
-            read_file(name, text, &mut origin, &mut satellites)?;
+            let held = read_file(name, text, &mut origin, &mut satellites)?;
+            // Columns 33 to 39 of the first line: how many epochs follow.
+            let announced = text.get(32..39).and_then(|count| count.trim().parse::<usize>().ok());
+            if let Some(announced) = announced.filter(|announced| held < *announced) {
+                cut_short.push(format!("{name} announces {announced} epochs and holds {held}"));
+            }
         }
         let origin = origin.ok_or(OrbitError::Empty { what: "an epoch".to_owned() })?;
         let first_us = satellites.values().filter_map(|found| found.keys().next()).min().copied().unwrap_or(0);
         let shift_s = first_us as f64 / 1e6;
         let tracks = satellites.into_iter().map(|(id, found)| track(id, found, shift_s)).collect();
-        Ok(Self { origin: origin.plus_s(shift_s), tracks })
+        Ok(Self { origin: origin.plus_s(shift_s), tracks, cut_short })
     }
 
     /// Length of the recording, s.
@@ -72,18 +80,20 @@ struct Found {
     manoeuvre: bool,
 }
 
+/// Read one file; how many epochs it holds.
 fn read_file(
     name: &str,
     text: &str,
     origin: &mut Option<GpsInstant>,
     satellites: &mut BTreeMap<String, BTreeMap<i64, Found>>,
-) -> Result<(), OrbitError> {
+) -> Result<usize, OrbitError> {
     if !text.starts_with('#') {
         let found = text.lines().next().unwrap_or("").chars().take(20).collect();
         return Err(OrbitError::Sp3 { file: name.to_owned(), line: 1, expected: "a line starting with #", found });
     }
     let mut scale = String::from("GPS");
     let mut now_us: Option<i64> = None;
+    let mut epochs = 0;
     for (i, line) in text.lines().enumerate() {
         let bad = |expected| OrbitError::Sp3 { file: name.to_owned(), line: i + 1, expected, found: line.to_owned() };
         match line.as_bytes().first() {
@@ -93,6 +103,7 @@ fn read_file(
             Some(b'*') => {
                 let instant =
                     epoch(line, &scale).ok_or_else(|| bad("an epoch: * year month day hour minute second"))?;
+                epochs += 1;
                 let base = *origin.get_or_insert(instant);
                 now_us = Some((instant.since_s(base) * 1e6).round() as i64);
             }
@@ -105,7 +116,7 @@ fn read_file(
             _ => {}
         }
     }
-    Ok(())
+    Ok(epochs)
 }
 
 fn epoch(line: &str, scale: &str) -> Option<GpsInstant> {

@@ -280,8 +280,7 @@ fn evidence(before: &Triad, after: &Triad, set: &[Part]) -> f64 {
 
 /// Analyse a case of static poses.
 pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
-    let gravity =
-        case.number("recording.gravity_m_s2")?.ok_or_else(|| case.wrong("recording.gravity_m_s2", "a number"))?;
+    let gravity = gravity(case)?;
     let poses = poses(case, files)?;
     let found = search(&included(case)?, &poses, gravity);
     let added = std::iter::once("as it stands").chain(found.added.iter().map(|(part, _)| part.id()));
@@ -290,6 +289,12 @@ pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result
         residuals: found.fits.iter().map(|fit| fit.residuals.clone()).collect(),
     };
     Ok((answer(case, &poses, gravity, &found), Plates::Poses(plate)))
+}
+
+/// The size of gravity where the poses were held, m/s^2.
+pub fn gravity(case: &MeasuredCase) -> Result<f64, MeasuredError> {
+    let key = "recording.gravity_m_s2";
+    case.number(key)?.filter(|g| *g > 0.0).ok_or_else(|| case.wrong(key, "a number above zero"))
 }
 
 /// The parts that the simulation has.

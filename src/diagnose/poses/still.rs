@@ -54,19 +54,29 @@ pub fn read(file: &str, text: &str, columns: Option<&[String]>) -> Result<Vec<Ro
             found: format!("{:?}", columns.unwrap_or_default()),
         });
     };
+    let to_s = match columns.and_then(|names| names[t].strip_prefix("t_")) {
+        Some("ms") => 1e-3,
+        Some("us") => 1e-6,
+        Some("ns") => 1e-9,
+        _ => 1.0,
+    };
     let mut rows = Vec::new();
     for (i, line) in text.lines().enumerate() {
         if line.trim().is_empty() || line.starts_with(['#', '%']) {
             continue;
         }
+        let commas = line.contains(',');
         let fields: Vec<Option<f64>> = line
-            .split(|c: char| c.is_whitespace() || c == ',')
-            .filter(|f| !f.is_empty())
+            .split(|c: char| if commas { c == ',' } else { c.is_whitespace() })
+            .map(str::trim)
+            .filter(|f| commas || !f.is_empty())
             .map(|f| f.parse().ok())
             .collect();
         let at = |k: usize| fields.get(k).copied().flatten().filter(|v| v.is_finite());
         match (at(t), at(x), at(y), at(z)) {
-            (Some(t_s), Some(x), Some(y), Some(z)) => rows.push(Row { t_s, counts: Vector3::new(x, y, z) }),
+            (Some(time), Some(x), Some(y), Some(z)) => {
+                rows.push(Row { t_s: time * to_s, counts: Vector3::new(x, y, z) })
+            }
             // A first line of names is allowed.
             _ if i == 0 => {}
             _ => {

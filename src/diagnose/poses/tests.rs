@@ -167,7 +167,7 @@ fn what_cannot_be_used_is_told_in_one_sentence() {
         diagnose(&case, &files).expect_err("an error").to_string()
     };
     let good = "\"t_s\",\"x_g\",\"y_g\",\"z_g\"";
-    assert!(said(case(good, ""), "").starts_with("case.toml: `recording.gravity_m_s2`: expected a number"));
+    assert!(said(case(good, ""), "").starts_with("case.toml: `recording.gravity_m_s2`: expected a number above zero"));
     assert!(said(case("\"t_s\",\"x_g\"", "gravity_m_s2 = 9.8"), "").contains("expected a time and three axes"));
     assert_eq!(
         said(case(good, "gravity_m_s2 = 9.8"), "0 1 2 3\n1 2 tea 4\n"),

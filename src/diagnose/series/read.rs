@@ -47,7 +47,8 @@ pub struct CovariateSeries {
 impl CovariateSeries {
     /// Whether it is a temperature.
     pub fn is_temperature(&self) -> bool {
-        matches!(self.unit.as_str(), "C" | "degC" | "K")
+        let unit: String = self.unit.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
+        matches!(unit.as_str(), "c" | "degc" | "celsius" | "k" | "degk" | "kelvin" | "f" | "degf" | "fahrenheit")
     }
 }
 
@@ -188,6 +189,7 @@ fn rows(case: &MeasuredCase, file: &str, text: &str, wanted: &[&Column]) -> Resu
     let places: Vec<usize> = wanted.iter().map(|c| place(&c.name)).collect::<Result<_, _>>()?;
     let (mut t_s, mut table, mut masked) = (Vec::new(), vec![Vec::new(); wanted.len()], 0);
     let mut first = None;
+    let mut unread: Option<(usize, String, String)> = None;
     for record in reader.records() {
         let Ok(record) = record else {
             masked += 1;
@@ -201,12 +203,27 @@ fn rows(case: &MeasuredCase, file: &str, text: &str, wanted: &[&Column]) -> Resu
                 t_s.push(stamp - *first.get_or_insert(stamp));
                 table.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
             }
-            _ => masked += 1,
+            (stamp, _) => {
+                masked += 1;
+                unread.get_or_insert_with(|| {
+                    let line = record.position().map_or(0, |p| p.line() as usize);
+                    let field = |k: usize| record.get(k).unwrap_or_default();
+                    if stamp.is_none() {
+                        let form = format.map_or("a time".to_owned(), |format| format!("a time as {format}"));
+                        return (line, format!("{form} in column {time}"), field(time_at).to_owned());
+                    }
+                    let is_number = |k: usize| field(k).parse::<f64>().is_ok_and(f64::is_finite);
+                    let (k, column) =
+                        places.iter().zip(wanted).find(|(k, _)| !is_number(**k)).unwrap_or((&0, &wanted[0]));
+                    (line, format!("a number in column {}", column.name), field(*k).to_owned())
+                });
+            }
         }
     }
-    if t_s.len() < masked {
-        let found = format!("{masked} of {} rows unreadable", masked + t_s.len());
-        return Err(bad(2, format!("numbers and times as {}", format.unwrap_or("numbers")), found));
+    // Holes are left out; a file that is mostly holes is another than the case says.
+    if let Some((line, expected, found)) = unread.filter(|_| t_s.len() < masked) {
+        let all = masked + t_s.len();
+        return Err(bad(line, format!("{expected} ({masked} of {all} rows cannot be read)"), found));
     }
     Ok((t_s, table, masked))
 }
