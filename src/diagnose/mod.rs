@@ -10,6 +10,7 @@ pub mod case;
 pub mod catalogue;
 pub mod design;
 pub mod error;
+pub mod live;
 pub mod locate;
 pub mod measure;
 pub mod measured;

@@ -73,6 +73,19 @@ impl Solution {
 
 /// Search and weigh. `start` is a first guess of the noise, when one is at hand.
 pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -> Solution {
+    match solve_unless(scene, library, start, &|| false) {
+        Some(solution) => solution,
+        None => unreachable!("nobody asked to stop"),
+    }
+}
+
+/// As [`solve`], and `None` as soon as `stop` says so: it is asked every second or so of work.
+pub fn solve_unless(
+    scene: &Scene,
+    library: &Library,
+    start: Option<&[AxisNoise; 3]>,
+    stop: &dyn Fn() -> bool,
+) -> Option<Solution> {
     let entries = &library.entries;
     let noise_null = search::fit_noise(scene, &scene.residual_ng, start, if start.is_some() { 50 } else { 110 });
     let null = search::weigh_with_own_noise(scene, entries, &Set::default(), &noise_null, 0, 0);
@@ -83,6 +96,9 @@ pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -
     let mut round = 0;
     let mut singles: Vec<(usize, f64)> = Vec::new();
     let (listed, opens) = loop {
+        if stop() {
+            return None;
+        }
         let frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
         let bank = Bank::new(&frame, entries);
         if round == 0 {
@@ -92,6 +108,9 @@ pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -
         }
         let mut listed = search::grow(&frame, &bank, &listed_ids, vec![Set::default()], SET_MAX);
         listed.retain(|s| !s.members.is_empty());
+        if stop() {
+            return None;
+        }
         polish(scene, &frame, entries, &mut listed, 8);
         let mut seeds = vec![Set::default()];
         seeds.extend(listed.iter().take(2).cloned());
@@ -118,17 +137,18 @@ pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -
         best_key = top.key();
         noise = search::weigh_with_own_noise(scene, entries, top, &noise, 2, 50).noise;
     };
-    let weigh = |sets: Vec<Set>, count: usize| {
+    let weigh = |sets: Vec<Set>, count: usize| -> Option<Vec<Weighed>> {
         let top = sets.first().map_or(0.0, |s| s.score);
         let worth = top > WORTH_A_REFIT;
         let keep = sets.into_iter().filter(|s| s.score > top - 14.0).take(if worth { count } else { 1 });
-        let mut weighed: Vec<Weighed> = keep
-            .map(|s| search::weigh_with_own_noise(scene, entries, &s, &noise, if worth { 2 } else { 1 }, 40))
-            .collect();
+        let rounds = if worth { 2 } else { 1 };
+        let mut weighed = keep
+            .map(|s| (!stop()).then(|| search::weigh_with_own_noise(scene, entries, &s, &noise, rounds, 40)))
+            .collect::<Option<Vec<Weighed>>>()?;
         weighed.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
-        weighed
+        Some(weighed)
     };
-    Solution { listed: weigh(listed, OWN_NOISE[0]), open: weigh(opens, OWN_NOISE[1]), null, singles }
+    Some(Solution { listed: weigh(listed, OWN_NOISE[0])?, open: weigh(opens, OWN_NOISE[1])?, null, singles })
 }
 
 /// Refine the best sets at one noise, and sort again.

@@ -93,7 +93,7 @@ pub fn conclude(
         Verdict::Unexplained => solution.listed.first(),
         _ => Some(simplest(&listed)),
     };
-    let mut answer = empty(scene, verdict, probability);
+    let mut answer = Diagnosis { verdict, ..Diagnosis::nothing(&scene.case.header.id, probability) };
     answer.located.covariates =
         locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
     let null_frame = Frame::new(&solution.null.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
@@ -125,25 +125,6 @@ pub fn conclude(
     }
     answer.notes = notes;
     (answer, signal, ladder)
-}
-
-fn empty(scene: &Scene, verdict: Verdict, probability: f64) -> Diagnosis {
-    Diagnosis {
-        schema: "oare.diagnosis/1".into(),
-        case: scene.case.header.id.clone(),
-        verdict,
-        false_alarm_probability: probability,
-        located: Located { frame: "body".into(), ..Located::default() },
-        effects: Vec::new(),
-        alternatives: Vec::new(),
-        hypothesis: None,
-        fit: None,
-        upper_limits: Vec::new(),
-        separating_observation: None,
-        cannot_tell_apart: Vec::new(),
-        arcs: Vec::new(),
-        notes: Vec::new(),
-    }
 }
 
 /// Listed sets whose sizes can be believed; the others are refused, with the reason.

@@ -149,6 +149,7 @@ impl Writer {
                     self.write_until_durable(&batch, runtime, give_up)?;
                     self.take(&batch);
                     self.settle_and_publish();
+                    self.publish_waiting();
                     self.conclude(&batch, parts.is_empty())?;
                     last_arrival = Instant::now();
                 }
@@ -157,11 +158,13 @@ impl Writer {
                     if !self.flushed && last_arrival.elapsed() > IDLE_FLUSH {
                         self.flush();
                     }
+                    self.publish_waiting();
                     self.journal_until_durable(runtime, give_up)?;
                 }
             }
         }
         self.flush();
+        self.publish_waiting();
         self.journal_until_durable(runtime, give_up)
     }
 
@@ -317,10 +320,22 @@ impl Writer {
                 let station = self.station.read().expect("no holder panics");
                 changes.by_ref().take(AT_ONCE).filter_map(|change| body(&self.hub, &station, change)).collect()
             };
-            let journaled = self.hub.publish(bodies);
-            self.unjournaled.entries.extend(journaled.entries);
-            self.unjournaled.forgotten.extend(journaled.forgotten);
+            self.publish_bodies(bodies);
         }
+    }
+
+    /// What others left at the hub.
+    fn publish_waiting(&mut self) {
+        let waiting = self.hub.take_waiting();
+        if !waiting.is_empty() {
+            self.publish_bodies(waiting);
+        }
+    }
+
+    fn publish_bodies(&mut self, bodies: Vec<Body>) {
+        let journaled = self.hub.publish(bodies);
+        self.unjournaled.entries.extend(journaled.entries);
+        self.unjournaled.forgotten.extend(journaled.forgotten);
     }
 
     fn show(&self) {
