@@ -243,7 +243,7 @@ pub struct SeparatingObservation {
     pub kind: String,
     /// What to do.
     pub text: String,
-    /// Matched-filter SNR by which the sets would then differ, less what they differ by now; None where it was not simulated.
+    /// Log evidence that it is expected to add for the true set against its nearest rival; None where it could not be simulated.
     pub gain: Option<f64>,
 }
 

@@ -25,6 +25,7 @@ pub mod recorder;
 pub mod report;
 pub mod scene;
 pub mod search;
+pub mod separating;
 pub mod series;
 pub mod solve;
 pub mod verdict;

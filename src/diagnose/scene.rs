@@ -122,7 +122,56 @@ impl Surroundings {
     }
 }
 
+impl Surroundings {
+    /// The first grid points.
+    pub fn until(&self, points: usize) -> Self {
+        let mut cut = self.clone();
+        cut.simulated_grid_ng.iter_mut().for_each(|series| series.truncate(points));
+        cut.body.truncate(points);
+        for series in [
+            &mut cut.r_m,
+            &mut cut.v_m_s,
+            &mut cut.w_rad_s,
+            &mut cut.wdot_rad_s2,
+            &mut cut.sun,
+            &mut cut.field_body_t,
+            &mut cut.drag_ng,
+        ] {
+            series.truncate(points);
+        }
+        for series in [&mut cut.grid_s, &mut cut.sunlit, &mut cut.density_kg_m3, &mut cut.temperature_c] {
+            series.truncate(points);
+        }
+        cut
+    }
+
+    /// These, and what comes later.
+    pub fn then(mut self, later: &Self) -> Self {
+        for (series, more) in self.simulated_grid_ng.iter_mut().zip(&later.simulated_grid_ng) {
+            series.extend(more);
+        }
+        self.body.extend(&later.body);
+        self.r_m.extend(&later.r_m);
+        self.v_m_s.extend(&later.v_m_s);
+        self.w_rad_s.extend(&later.w_rad_s);
+        self.wdot_rad_s2.extend(&later.wdot_rad_s2);
+        self.sun.extend(&later.sun);
+        self.field_body_t.extend(&later.field_body_t);
+        self.drag_ng.extend(&later.drag_ng);
+        self.grid_s.extend(&later.grid_s);
+        self.sunlit.extend(&later.sunlit);
+        self.density_kg_m3.extend(&later.density_kg_m3);
+        self.temperature_c.extend(&later.temperature_c);
+        self
+    }
+}
+
 impl<'a> Scene<'a> {
+    /// What no window changes.
+    pub fn surroundings(&self) -> &Surroundings {
+        &self.surroundings
+    }
+
     /// Furnish a checked case.
     ///
     /// # Errors
