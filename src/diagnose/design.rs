@@ -42,6 +42,16 @@ impl Column {
         sum
     }
 
+    /// This column times `factor`.
+    pub fn times(&self, factor: f64) -> Column {
+        let mut out = self.clone();
+        for part in out.parts.iter_mut().flatten() {
+            part.whitened.iter_mut().for_each(|x| *x *= factor);
+            part.constant *= factor;
+        }
+        out
+    }
+
     /// This column less another times `factor`.
     pub fn less(&self, other: &Column, factor: f64) -> Column {
         let mut out = self.clone();
@@ -102,6 +112,13 @@ impl Frame {
 
     /// Whiten a regressor, scaled by its prior size.
     pub fn column(&self, raw: &Raw, size: f64) -> Column {
+        let whole = |s: &Vec<f64>| s.first().is_some_and(|x| *x != 0.0) && s.last().is_some_and(|x| *x != 0.0);
+        if let [Some(x), Some(y), Some(z)] = raw
+            && [x, y, z].into_iter().all(whole)
+        {
+            let whitened = Whitener::whiten_three(&self.whiteners, [x, y, z]);
+            return Column { parts: self.whole_parts(whitened, [size; 3]).map(Some) };
+        }
         Column { parts: std::array::from_fn(|k| raw[k].as_ref().map(|series| self.part(k, series, size))) }
     }
 
@@ -110,6 +127,33 @@ impl Frame {
         let mut column = Column::default();
         column.parts[axis] = Some(self.part(axis, series, size));
         column
+    }
+
+    /// Whiten a scalar on each axis: three columns.
+    pub fn scalars(&self, series: &[f64], sizes: &[f64; 3]) -> [Column; 3] {
+        let ends = [series.first(), series.last()];
+        let parts = if ends.iter().all(|x| x.is_some_and(|x| *x != 0.0)) {
+            self.whole_parts(Whitener::whiten_three(&self.whiteners, [series; 3]), *sizes)
+        } else {
+            std::array::from_fn(|k| self.part(k, series, sizes[k]))
+        };
+        let mut axis = 0;
+        parts.map(|part| {
+            let mut column = Column::default();
+            column.parts[axis] = Some(part);
+            axis += 1;
+            column
+        })
+    }
+
+    fn whole_parts(&self, whitened: [Vec<f64>; 3], sizes: [f64; 3]) -> [Part; 3] {
+        let mut axis = 0;
+        whitened.map(|mut whitened| {
+            whitened.iter_mut().for_each(|x| *x *= sizes[axis]);
+            let constant = dot(&whitened, &self.ones[axis]);
+            axis += 1;
+            Part { first: 0, whitened, constant }
+        })
     }
 
     fn part(&self, axis: usize, series: &[f64], size: f64) -> Part {
@@ -124,6 +168,43 @@ impl Frame {
     /// Predictive standard deviations of an axis.
     pub fn predictive_sd(&self, axis: usize) -> Vec<f64> {
         self.whiteners[axis].predictive_sd()
+    }
+}
+
+/// Normal equations of columns beside those chosen.
+pub struct Normal {
+    a: DMatrix<f64>,
+    y: DVector<f64>,
+}
+
+impl Normal {
+    /// Log evidence gained by these columns, their prior sizes all multiplied by `scale`.
+    pub fn gain(&self, scale: f64) -> f64 {
+        let n = self.y.len();
+        let a = &self.a * (scale * scale) + DMatrix::identity(n, n);
+        match Cholesky::new(a) {
+            Some(c) => {
+                let y = &self.y * scale;
+                let half = c.l_dirty().solve_lower_triangular(&y).unwrap_or_else(|| DVector::zeros(n));
+                0.5 * half.norm_squared() - (0..n).map(|i| c.l_dirty()[(i, i)].ln()).sum::<f64>()
+            }
+            None => f64::NEG_INFINITY,
+        }
+    }
+
+    /// What the columns explain at most, their sizes free: half the chi square.
+    pub fn explained(&self) -> f64 {
+        let n = self.y.len();
+        let jitter = 1e-9 * self.a.diagonal().max().max(1e-300);
+        let half = Cholesky::new(&self.a + DMatrix::identity(n, n) * jitter)
+            .and_then(|c| c.l_dirty().solve_lower_triangular(&self.y));
+        half.map_or(0.0, |h| 0.5 * h.norm_squared())
+    }
+
+    /// Log evidence gained by column `i` alone.
+    pub fn gain_of(&self, i: usize, scale: f64) -> f64 {
+        let one_more = scale * scale * self.a[(i, i)] + 1.0;
+        0.5 * (scale * self.y[i]).powi(2) / one_more - 0.5 * one_more.ln()
     }
 }
 
@@ -182,31 +263,27 @@ impl<'a> Chosen<'a> {
         }
     }
 
-    /// Log evidence gained by adding linear columns, and the SNR left in them.
+    /// Log evidence gained by adding linear columns.
     pub fn gain(&self, columns: &[Column]) -> f64 {
+        self.normal(columns).gain(1.0)
+    }
+
+    /// The normal equations of more linear columns beside those chosen.
+    pub fn normal(&self, columns: &[Column]) -> Normal {
         let n = columns.len();
         let overlaps: Vec<DVector<f64>> = columns.iter().map(|c| self.overlap(c)).collect();
         let y = DVector::from_iterator(
             n,
             columns.iter().zip(&overlaps).map(|(c, o)| c.dot(&self.data) - o.dot(&self.reduced)),
         );
-        let mut a = DMatrix::identity(n, n);
+        let mut a = DMatrix::zeros(n, n);
         for i in 0..n {
             for j in 0..=i {
-                let product = columns[i].dot(&columns[j]) - overlaps[i].dot(&overlaps[j]);
-                a[(i, j)] += product;
-                if i != j {
-                    a[(j, i)] += product;
-                }
+                a[(i, j)] = columns[i].dot(&columns[j]) - overlaps[i].dot(&overlaps[j]);
+                a[(j, i)] = a[(i, j)];
             }
         }
-        match Cholesky::new(a) {
-            Some(c) => {
-                let half = c.l_dirty().solve_lower_triangular(&y).unwrap_or_else(|| DVector::zeros(n));
-                0.5 * half.norm_squared() - (0..n).map(|i| c.l_dirty()[(i, i)].ln()).sum::<f64>()
-            }
-            None => f64::NEG_INFINITY,
-        }
+        Normal { a, y }
     }
 
     /// Log evidence gained by adding a column of fixed amplitude one.

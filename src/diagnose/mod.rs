@@ -22,6 +22,7 @@ mod optimise;
 pub mod orbit;
 pub mod poses;
 pub mod recorder;
+pub mod remains;
 pub mod report;
 pub mod scene;
 pub mod search;

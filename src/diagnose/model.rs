@@ -114,14 +114,14 @@ fn onset_sigma(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: us
     };
     let chosen = others.chosen(frame);
     let steps = (ONSET_SCAN_S[0] / ONSET_SCAN_S[1]) as i32;
-    let sizes = &entries[set.members[i].entry].sizes;
+    let sizes = set.members[i].sizes(entries);
     let scan: Vec<(f64, f64)> = (-steps..=steps)
         .filter_map(|s| {
             let shift = f64::from(s) * ONSET_SCAN_S[1];
             let mut theta = set.members[i].theta;
             theta[0] += shift;
             let raws = (effect.signature)(scene, &theta)?.columns();
-            let columns: Vec<Column> = raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, *size)).collect();
+            let columns: Vec<Column> = raws.iter().zip(&sizes).map(|(raw, size)| frame.column(raw, *size)).collect();
             Some((shift, chosen.gain(&columns)))
         })
         .collect();
@@ -139,7 +139,7 @@ fn joint_covariance(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) 
         let raws = entry_columns(scene, entry, &m.theta)?;
         for k in 0..m.linear() {
             columns.push(frame.column(&raws[m.axis.unwrap_or(k)], 1.0));
-            prior.push(entry.sizes[m.axis.unwrap_or(k)].powi(-2));
+            prior.push((m.scale * entry.sizes[m.axis.unwrap_or(k)]).powi(-2));
         }
     }
     for (i, m) in set.members.iter().enumerate() {
@@ -176,7 +176,7 @@ fn joint_covariance(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) 
 fn entry_columns(scene: &Scene, entry: &Entry, theta: &super::catalogue::Theta) -> Option<Vec<super::design::Raw>> {
     match entry.family {
         Family::Listed(effect) => (effect.signature)(scene, theta).map(|s| s.columns()),
-        Family::Open(_) => Some(entry.points[0].1.columns()),
+        Family::Open(_) => entry.points.get(theta[0] as usize).map(|(_, shape)| shape.columns()),
     }
 }
 
@@ -287,7 +287,7 @@ fn predict(scene: &Scene, entries: &[Entry], set: &Set, train: &Half) -> Axes {
                 fixed.push(train.frame.column(&part, 1.0));
                 add(&mut sum, &raw, 1.0);
             } else {
-                let size = entries[m.entry].sizes[place];
+                let size = m.scale * entries[m.entry].sizes[place];
                 linear.push((train.frame.column(&part, size), raw, size));
             }
         }

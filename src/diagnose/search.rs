@@ -20,6 +20,17 @@ const BEAM: usize = 4;
 /// Sets weighed each with its own noise.
 const FINALISTS: usize = 10;
 
+/// Log prior odds of every member beyond the second: three things left out at once are rarer than their odds one by one say,
+/// and three effects together imitate nearly anything.
+const CROWD: f64 = -4.0;
+
+fn crowd(members: usize) -> f64 {
+    CROWD * members.saturating_sub(2) as f64
+}
+
+/// Size of a small effect, of its usual size.
+const SMALL: f64 = 0.2;
+
 /// What a family is.
 #[derive(Clone, Copy)]
 pub enum Family {
@@ -61,16 +72,25 @@ impl Entry {
 
     /// An open form.
     pub fn open(index: usize, atom: &Atom, log_prior: f64) -> Self {
-        let sizes = vec![
-            super::open_form::SIZE_NG;
-            if matches!(atom.shape, Shape::Scalar(_)) { 3 } else { atom.shape.columns().len() }
-        ];
+        let count = match &atom.forms[0].shape {
+            Shape::Columns(columns) => columns.len(),
+            _ => 3,
+        };
+        let sizes = vec![super::open_form::SIZE_NG; count];
         Self {
             family: Family::Open(index),
             log_prior,
             log_volume: 0.0,
-            points: vec![([0.0; 2], atom.shape.clone())],
+            points: atom.forms.iter().enumerate().map(|(i, f)| ([i as f64, 0.0], f.shape.clone())).collect(),
             sizes,
+        }
+    }
+
+    /// What the prior sizes may be multiplied by, each as likely: an effect is of its usual size or well below it.
+    fn scales(&self) -> &'static [f64] {
+        match self.family {
+            Family::Listed(effect) if effect.linear.is_empty() || effect.linear.iter().any(|l| l.whole) => &[1.0],
+            _ => &[1.0, SMALL],
         }
     }
 
@@ -97,10 +117,12 @@ pub struct Bank<'a> {
     points: Vec<Vec<Whitened>>,
 }
 
-fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64]) -> Whitened {
+fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64], scale: f64) -> Whitened {
     let (columns, fixed) = match shape {
-        Shape::Scalar(series) => ((0..3).map(|k| frame.scalar(k, series, sizes[k])).collect(), false),
-        Shape::Columns(raws) => (raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, *size)).collect(), false),
+        Shape::Scalar(series) => (frame.scalars(series, &std::array::from_fn(|k| scale * sizes[k])).to_vec(), false),
+        Shape::Columns(raws) => {
+            (raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect(), false)
+        }
         Shape::Fixed(axes) => (vec![frame.column(&axes.clone().map(Some), 1.0)], true),
     };
     Whitened { theta, columns, fixed }
@@ -111,7 +133,7 @@ impl<'a> Bank<'a> {
     pub fn new(frame: &Frame, entries: &'a [Entry]) -> Self {
         let points = entries
             .iter()
-            .map(|e| e.points.iter().map(|(theta, shape)| whiten(frame, *theta, shape, &e.sizes)).collect())
+            .map(|e| e.points.iter().map(|(theta, shape)| whiten(frame, *theta, shape, &e.sizes, 1.0)).collect())
             .collect();
         Self { entries, points }
     }
@@ -124,6 +146,8 @@ pub struct Member {
     pub entry: usize,
     /// Axes it acts on, where an open form was narrowed to one.
     pub axis: Option<usize>,
+    /// What its prior sizes are multiplied by.
+    pub scale: f64,
     /// Nonlinear parameters.
     pub theta: Theta,
     /// Their log prior density times the volume of their posterior.
@@ -161,13 +185,13 @@ impl Set {
     /// Log evidence and priors at the noise of the frame.
     pub fn weigh(&mut self, frame: &Frame, entries: &[Entry]) {
         let priors: f64 = self.members.iter().map(|m| entries[m.entry].log_prior + m.log_occam).sum();
-        self.score = self.chosen(frame).log_evidence + priors;
+        self.score = self.chosen(frame).log_evidence + priors + crowd(self.members.len());
     }
 
     /// Whiten the members again for another noise.
     pub fn rewhiten(&mut self, scene: &Scene, frame: &Frame, entries: &[Entry]) {
         for m in &mut self.members {
-            if let Some(point) = point_at(scene, frame, &entries[m.entry], &m.theta, m.axis) {
+            if let Some(point) = point_at(scene, frame, &entries[m.entry], m, &m.theta) {
                 m.point = point;
             }
         }
@@ -175,8 +199,7 @@ impl Set {
 
     /// Mean and covariance of all linear coefficients in their own units, members in order.
     pub fn coefficients(&self, frame: &Frame, entries: &[Entry]) -> (DVector<f64>, DMatrix<f64>) {
-        let sizes: Vec<f64> =
-            self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| member_sizes(m, entries)).collect();
+        let sizes: Vec<f64> = self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| m.sizes(entries)).collect();
         let (mean, covariance) = self.chosen(frame).posterior();
         let scale = DMatrix::from_diagonal(&DVector::from_vec(sizes));
         (&scale * mean, &scale * covariance * &scale)
@@ -214,27 +237,29 @@ impl Member {
     pub fn linear(&self) -> usize {
         if self.point.fixed { 0 } else { self.point.columns.len() }
     }
-}
 
-fn member_sizes(m: &Member, entries: &[Entry]) -> Vec<f64> {
-    let sizes = &entries[m.entry].sizes;
-    m.axis.map_or_else(|| sizes.clone(), |a| vec![sizes[a]])
+    /// Prior sizes of its linear coefficients.
+    pub fn sizes(&self, entries: &[Entry]) -> Vec<f64> {
+        let sizes = &entries[self.entry].sizes;
+        let picked = self.axis.map_or_else(|| sizes.clone(), |a| vec![sizes[a]]);
+        picked.iter().map(|size| self.scale * size).collect()
+    }
 }
 
 fn shape_at(scene: &Scene, entry: &Entry, theta: &Theta) -> Option<Shape> {
     match entry.effect() {
         Some(effect) => (effect.signature)(scene, theta),
-        None => Some(entry.points[0].1.clone()),
+        None => entry.points.get(theta[0] as usize).map(|(_, shape)| shape.clone()),
     }
 }
 
-fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, theta: &Theta, axis: Option<usize>) -> Option<Whitened> {
+fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, m: &Member, theta: &Theta) -> Option<Whitened> {
     let known = entry.points.iter().find(|(t, _)| t == theta);
     let mut point = match known {
-        Some((_, shape)) => whiten(frame, *theta, shape, &entry.sizes),
-        None => whiten(frame, *theta, &shape_at(scene, entry, theta)?, &entry.sizes),
+        Some((_, shape)) => whiten(frame, *theta, shape, &entry.sizes, m.scale),
+        None => whiten(frame, *theta, &shape_at(scene, entry, theta)?, &entry.sizes, m.scale),
     };
-    if let Some(axis) = axis {
+    if let Some(axis) = m.axis {
         point.columns = vec![point.columns.swap_remove(axis)];
     }
     Some(point)
@@ -243,37 +268,38 @@ fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, theta: &Theta, axis: Op
 /// The best way to add one entry to a chosen set: the score gained with priors, and the member.
 pub fn best_of_entry(bank: &Bank, index: usize, chosen: &Chosen) -> (f64, Member) {
     let entry = &bank.entries[index];
-    let gains: Vec<f64> = bank.points[index]
-        .iter()
-        .map(|p| if p.fixed { chosen.gain_fixed(&p.columns[0]) } else { chosen.gain(&p.columns) })
-        .collect();
-    let best = (0..gains.len()).max_by(|a, b| gains[*a].total_cmp(&gains[*b])).unwrap_or(0);
-    let top = gains[best];
-    let marginal = top + gains.iter().map(|g| (g - top).exp()).sum::<f64>().ln() - (gains.len() as f64).ln();
-    let mut member = Member {
-        entry: index,
-        axis: None,
-        theta: bank.points[index][best].theta,
-        log_occam: marginal - top,
-        theta_sigma: [0.0; 2],
-        point: bank.points[index][best].clone(),
-    };
-    let mut gain = marginal;
-    if matches!(entry.family, Family::Open(_)) && matches!(entry.points[0].1, Shape::Scalar(_)) {
-        // All axes, or one of them: a quarter each.
-        let fourth = 4.0_f64.ln();
-        gain -= fourth;
-        member.log_occam -= fourth;
-        for axis in 0..3 {
-            let single = chosen.gain(&bank.points[index][0].columns[axis..=axis]) - fourth;
-            if single > gain {
-                gain = single;
-                member.axis = Some(axis);
-                member.point.columns = vec![bank.points[index][0].columns[axis].clone()];
+    let points = &bank.points[index];
+    // An open form of one series acts on all axes or on one of them: a quarter each.
+    let narrow = matches!((entry.family, &entry.points[0].1), (Family::Open(_), Shape::Scalar(_)));
+    let scales = entry.scales();
+    let mut ways: Vec<(f64, usize, Option<usize>, f64)> = Vec::with_capacity(points.len() * 8);
+    for (i, p) in points.iter().enumerate() {
+        if p.fixed {
+            ways.push((chosen.gain_fixed(&p.columns[0]), i, None, 1.0));
+            continue;
+        }
+        let normal = chosen.normal(&p.columns);
+        for &scale in scales {
+            ways.push((normal.gain(scale), i, None, scale));
+            if narrow {
+                ways.extend((0..3).map(|axis| (normal.gain_of(axis, scale), i, Some(axis), scale)));
             }
         }
     }
-    (gain + entry.log_prior, member)
+    let best = ways.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
+    let (top, best, axis, scale) = best.unwrap_or((f64::MIN, 0, None, 1.0));
+    let marginal = top + (ways.iter().map(|w| (w.0 - top).exp()).sum::<f64>() / ways.len() as f64).ln();
+    let mut point = points[best].clone();
+    if let Some(axis) = axis {
+        point.columns = vec![point.columns.swap_remove(axis)];
+    }
+    if !point.fixed {
+        point.columns = point.columns.iter().map(|c| c.times(scale)).collect();
+    }
+    let theta_sigma = [0.0; 2];
+    let member =
+        Member { entry: index, axis, scale, theta: point.theta, log_occam: marginal - top, theta_sigma, point };
+    (marginal + entry.log_prior, member)
 }
 
 /// Grow sets from `seeds` by one member each at a time, over the entries of `allowed`.
@@ -292,7 +318,7 @@ pub fn grow(frame: &Frame, bank: &Bank, allowed: &[usize], seeds: Vec<Set>, size
                 let mut grown = set.clone();
                 grown.members.push(member);
                 grown.members.sort_by_key(|m| m.entry);
-                grown.score = set.score + gain;
+                grown.score = set.score + gain + crowd(grown.members.len()) - crowd(set.members.len());
                 next.push(grown);
             }
         }
@@ -332,9 +358,10 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         };
         let chosen = others.chosen(frame);
         let mut theta = set.members[i].theta;
+        let scale = set.members[i].scale;
         let gain = |theta: &Theta| -> f64 {
             let Some(shape) = (effect.signature)(scene, theta) else { return f64::NEG_INFINITY };
-            let point = whiten(frame, *theta, &shape, &entry.sizes);
+            let point = whiten(frame, *theta, &shape, &entry.sizes, scale);
             if point.fixed { chosen.gain_fixed(&point.columns[0]) } else { chosen.gain(&point.columns) }
         };
         let start: Vec<f64> = free.iter().map(|j| theta[*j]).collect();
@@ -356,8 +383,9 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
             continue;
         }
         let (log_occam, sigma) = volume(&gain, &theta, &free, effect, entry.log_volume, peak);
-        if let Some(point) = point_at(scene, frame, entry, &theta, None) {
+        if let Some(point) = point_at(scene, frame, entry, &set.members[i], &theta) {
             let m = &mut set.members[i];
+            let log_occam = log_occam - (entry.scales().len() as f64).ln();
             (m.theta, m.log_occam, m.theta_sigma, m.point) = (theta, log_occam, sigma, point);
         }
     }

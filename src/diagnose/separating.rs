@@ -17,7 +17,7 @@ use crate::physics::{J2, Vec3, drag, gravity_gradient, rotation};
 use crate::units::NANO_G_M_S2;
 
 use super::answer::SeparatingObservation;
-use super::case::{Ancillary, Case, Expectation, Recording, Simulation};
+use super::case::{Ancillary, Case, Expectation, Simulation};
 use super::catalogue::{Effect, Shape, Theta};
 use super::design::{Chosen, Column, Frame, Raw};
 use super::noise::AxisNoise;

@@ -14,6 +14,12 @@ const WORTH_A_REFIT: f64 = -6.0;
 /// Sets weighed with their own noise, listed and open.
 const OWN_NOISE: [usize; 2] = [6, 4];
 
+/// The same of those found as if there were no slow noise.
+const OWN_NOISE_QUIET: [usize; 2] = [3, 2];
+/// Slow noise in that search, as a share of a window's white noise, and its correlation time, s.
+const QUIET_SHARE: f64 = 0.04;
+const QUIET_TAU_S: f64 = 3000.0;
+
 /// What a search needs beside the scene, made once a case.
 pub struct Library {
     /// Listed entries, then open ones.
@@ -89,16 +95,115 @@ pub fn solve_unless(
     let entries = &library.entries;
     let noise_null = search::fit_noise(scene, &scene.residual_ng, start, if start.is_some() { 50 } else { 110 });
     let null = search::weigh_with_own_noise(scene, entries, &Set::default(), &noise_null, 0, 0);
-    let listed_ids: Vec<usize> = (0..library.listed).collect();
-    let open_ids: Vec<usize> = (library.listed..entries.len()).collect();
-    let mut noise = noise_null;
-    let mut best_key = Vec::new();
-    let mut round = 0;
-    let mut singles: Vec<(usize, f64)> = Vec::new();
-    let (listed, opens) = loop {
+    let (pool, singles) = converged(scene, library, &noise_null, stop)?;
+    let (mut listed, mut open) = pool.weigh(scene, entries, OWN_NOISE, stop)?;
+    // What the null takes for slow noise may be a slow effect: looked for a second time as if there were no slow noise. Each
+    // candidate is weighed with the noise of its own residual as all are.
+    if let Some(quiet) = quiet(&noise_null) {
+        let frame = Frame::new(&quiet, &scene.schedule, &scene.activity, &scene.residual_ng);
+        let pool = Pool::found(scene, library, &frame, &Bank::new(&frame, entries), quiet, stop)?;
+        let (more_listed, more_open) = pool.weigh(scene, entries, OWN_NOISE_QUIET, stop)?;
+        merge(&mut listed, more_listed);
+        merge(&mut open, more_open);
+    }
+    Some(Solution { listed, open, null, singles })
+}
+
+/// The noise with hardly any slow part, `None` where it has hardly any.
+fn quiet(noise: &[AxisNoise; 3]) -> Option<[AxisNoise; 3]> {
+    let level = |n: &AxisNoise| QUIET_SHARE * n.white_ng;
+    noise
+        .iter()
+        .any(|n| n.slow_ng > 2.0 * level(n))
+        .then(|| noise.map(|n| AxisNoise { slow_ng: n.slow_ng.min(level(&n)), slow_tau_s: QUIET_TAU_S, ..n }))
+}
+
+/// Sets found at one noise, each kind best first.
+struct Pool {
+    noise: [AxisNoise; 3],
+    listed: Vec<Set>,
+    opens: Vec<Set>,
+}
+
+impl Pool {
+    fn found(
+        scene: &Scene,
+        library: &Library,
+        frame: &Frame,
+        bank: &Bank,
+        noise: [AxisNoise; 3],
+        stop: &dyn Fn() -> bool,
+    ) -> Option<Self> {
         if stop() {
             return None;
         }
+        let entries = &library.entries;
+        let listed_ids: Vec<usize> = (0..library.listed).collect();
+        let open_ids: Vec<usize> = (library.listed..entries.len()).collect();
+        let mut listed = search::grow(frame, bank, &listed_ids, vec![Set::default()], SET_MAX);
+        listed.retain(|s| !s.members.is_empty());
+        if stop() {
+            return None;
+        }
+        polish(scene, frame, entries, &mut listed, 8);
+        let mut seeds = vec![Set::default()];
+        seeds.extend(listed.iter().take(2).cloned());
+        let mut opens: Vec<Set> = Vec::new();
+        for seed in seeds {
+            let size = seed.members.len() + 1;
+            let mut grown = search::grow(frame, bank, &open_ids, vec![seed], size);
+            grown.retain(|s| library.is_open(s));
+            grown.truncate(3);
+            opens.extend(grown);
+        }
+        opens.sort_by(|a, b| b.score.total_cmp(&a.score));
+        // An open form with what the catalogue adds to it.
+        let mut joined = search::grow(frame, bank, &listed_ids, opens.iter().take(2).cloned().collect(), 2);
+        joined.retain(|s| library.is_open(s));
+        opens.extend(joined.into_iter().take(4));
+        distinct(&mut opens);
+        Some(Self { noise, listed, opens })
+    }
+
+    fn top(&self) -> Option<&Set> {
+        [self.listed.first(), self.opens.first()].into_iter().flatten().max_by(|a, b| a.score.total_cmp(&b.score))
+    }
+
+    /// The best of each kind, each weighed with its own noise, best first.
+    fn weigh(
+        self,
+        scene: &Scene,
+        entries: &[Entry],
+        count: [usize; 2],
+        stop: &dyn Fn() -> bool,
+    ) -> Option<(Vec<Weighed>, Vec<Weighed>)> {
+        let weigh = |sets: Vec<Set>, count: usize| -> Option<Vec<Weighed>> {
+            let top = sets.first().map_or(0.0, |s| s.score);
+            let worth = top > WORTH_A_REFIT;
+            let keep = sets.into_iter().filter(|s| s.score > top - 14.0).take(if worth { count } else { 1 });
+            let rounds = if worth { 2 } else { 1 };
+            let mut weighed = keep
+                .map(|s| (!stop()).then(|| search::weigh_with_own_noise(scene, entries, &s, &self.noise, rounds, 40)))
+                .collect::<Option<Vec<Weighed>>>()?;
+            weighed.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+            Some(weighed)
+        };
+        Some((weigh(self.listed, count[0])?, weigh(self.opens, count[1])?))
+    }
+}
+
+/// Sets found at the noise of the best of them, from the null's noise on; and the score of every entry alone at the latter.
+fn converged(
+    scene: &Scene,
+    library: &Library,
+    noise_null: &[AxisNoise; 3],
+    stop: &dyn Fn() -> bool,
+) -> Option<(Pool, Vec<(usize, f64)>)> {
+    let entries = &library.entries;
+    let mut noise = *noise_null;
+    let mut best_key = Vec::new();
+    let mut singles = Vec::new();
+    for round in 0.. {
         let frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
         let bank = Bank::new(&frame, entries);
         if round == 0 {
@@ -106,49 +211,26 @@ pub fn solve_unless(
             let chosen = nothing.chosen(&frame);
             singles = (0..entries.len()).map(|i| (i, search::best_of_entry(&bank, i, &chosen).0)).collect();
         }
-        let mut listed = search::grow(&frame, &bank, &listed_ids, vec![Set::default()], SET_MAX);
-        listed.retain(|s| !s.members.is_empty());
-        if stop() {
-            return None;
-        }
-        polish(scene, &frame, entries, &mut listed, 8);
-        let mut seeds = vec![Set::default()];
-        seeds.extend(listed.iter().take(2).cloned());
-        let mut opens: Vec<Set> = Vec::new();
-        for seed in seeds {
-            let size = seed.members.len() + 1;
-            let mut grown = search::grow(&frame, &bank, &open_ids, vec![seed], size);
-            grown.retain(|s| library.is_open(s));
-            grown.truncate(3);
-            opens.extend(grown);
-        }
-        opens.sort_by(|a, b| b.score.total_cmp(&a.score));
-        // An open form with what the catalogue adds to it.
-        let mut joined = search::grow(&frame, &bank, &listed_ids, opens.iter().take(2).cloned().collect(), 2);
-        joined.retain(|s| library.is_open(s));
-        opens.extend(joined.into_iter().take(4));
-        distinct(&mut opens);
-        round += 1;
-        let top = [listed.first(), opens.first()].into_iter().flatten().max_by(|a, b| a.score.total_cmp(&b.score));
-        let Some(top) = top else { break (listed, opens) };
-        if top.score < WORTH_A_REFIT || round == 3 || top.key() == best_key {
-            break (listed, opens);
-        }
+        let pool = Pool::found(scene, library, &frame, &bank, noise, stop)?;
+        let again = pool.top().filter(|top| top.score >= WORTH_A_REFIT && round < 2 && top.key() != best_key);
+        let Some(top) = again else { return Some((pool, singles)) };
         best_key = top.key();
         noise = search::weigh_with_own_noise(scene, entries, top, &noise, 2, 50).noise;
-    };
-    let weigh = |sets: Vec<Set>, count: usize| -> Option<Vec<Weighed>> {
-        let top = sets.first().map_or(0.0, |s| s.score);
-        let worth = top > WORTH_A_REFIT;
-        let keep = sets.into_iter().filter(|s| s.score > top - 14.0).take(if worth { count } else { 1 });
-        let rounds = if worth { 2 } else { 1 };
-        let mut weighed = keep
-            .map(|s| (!stop()).then(|| search::weigh_with_own_noise(scene, entries, &s, &noise, rounds, 40)))
-            .collect::<Option<Vec<Weighed>>>()?;
-        weighed.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
-        Some(weighed)
-    };
-    Some(Solution { listed: weigh(listed, OWN_NOISE[0])?, open: weigh(opens, OWN_NOISE[1])?, null, singles })
+    }
+    unreachable!("the rounds end by their number")
+}
+
+/// Of sets found twice the better weighed one, best first.
+fn merge(sets: &mut Vec<Weighed>, more: Vec<Weighed>) {
+    sets.extend(more);
+    sets.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
+    let mut keys: Vec<Vec<usize>> = Vec::new();
+    sets.retain(|w| {
+        let key = w.set.key();
+        let new = !keys.contains(&key);
+        keys.push(key);
+        new
+    });
 }
 
 /// Refine the best sets at one noise, and sort again.

@@ -3,10 +3,11 @@
 use super::answer::{
     Alternative, Diagnosis, EffectAnswer, Fit, FitLevel, Hypothesis, Located, ParameterAnswer, UpperLimit, Verdict,
 };
-use super::catalogue::{self, Effect};
+use super::catalogue::{self, Effect, WHOLE};
 use super::design::{Chosen, Column, Frame};
 use super::locate;
 use super::model::{self, MemberFit, rms};
+use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{self, Entry, Family, Set, Weighed};
 use super::separating;
@@ -16,12 +17,18 @@ use super::solve::{Library, Solution};
 const OPEN_MARGIN: f64 = 3.0;
 /// Log odds within which another set is as good, and the smaller of two nested sets is preferred.
 const EQUAL: f64 = 2.3;
-/// Log odds within which a set that does not hold the best one, nor is held by it, cannot be told from it.
-const RIVAL: f64 = 3.5;
+/// Log odds within which a set that does not hold the best one, nor is held by it, cannot be told from it: sets whose signatures
+/// differ by an SNR of three come within this in more than half of all records.
+const RIVAL: f64 = 5.0;
 /// Posterior below which an alternative is not mentioned.
 const MENTION: f64 = 0.004;
 /// A remaining autocorrelation this unlikely makes the errors wider.
 const WHITENESS_P: f64 = 1e-3;
+
+/// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
+const EVIDENCE_SHARE: f64 = 0.8;
+/// What remains overturns an explanation when it has more than this share of the energy explained.
+const REMAINS_SHARE: f64 = 0.03;
 
 /// What the answer rests on.
 struct Best<'a> {
@@ -38,7 +45,7 @@ fn ids(library: &Library, set: &Set) -> Vec<String> {
         .iter()
         .map(|m| match library.entries[m.entry].family {
             Family::Listed(effect) => effect.id.to_string(),
-            Family::Open(i) => library.atoms[i].formula.clone(),
+            Family::Open(i) => library.atoms[i].forms[m.theta[0] as usize].formula.clone(),
         })
         .collect()
 }
@@ -79,7 +86,7 @@ pub fn conclude(
     let open: Vec<&Weighed> = solution.open.iter().collect();
     let refused = solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior) - top(&listed) > OPEN_MARGIN;
     let open_wins = top(&open) - top(&listed).max(null) > OPEN_MARGIN;
-    let claimed = probability <= claim
+    let claimed = probability <= EVIDENCE_SHARE * claim
         && top(&listed).max(top(&open)).max(solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior))
             > null;
     let verdict = match (claimed, open_wins || refused) {
@@ -93,12 +100,19 @@ pub fn conclude(
         Verdict::Unexplained => solution.listed.first(),
         _ => Some(simplest(&listed)),
     };
-    let mut answer = Diagnosis { verdict, ..Diagnosis::nothing(&scene.case.header.id, probability) };
+    let (verdict, chosen, remains) = with_remains(scene, library, solution, (verdict, chosen), claim);
+    let least = remains.as_ref().map_or(1.0, |r| r.probability);
+    let overall = (probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
+    let mut answer = Diagnosis { verdict, ..Diagnosis::nothing(&scene.case.header.id, overall) };
     answer.located.covariates =
         locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
     let null_frame = Frame::new(&solution.null.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
     let Some(weighed) = chosen else {
         answer.notes = notes;
+        if let Some(r) = remains.filter(|_| verdict == Verdict::Unexplained) {
+            answer.located.axes.clone_from(&r.axes);
+            answer.hypothesis = Some(of_remains(&r, ""));
+        }
         answer.upper_limits = upper_limits(scene, library, &null_frame, &Set::default());
         answer.fit = Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), &mut answer.notes).0);
         return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder);
@@ -120,11 +134,52 @@ pub fn conclude(
     };
     answer.upper_limits = upper_limits(scene, library, &best.frame, &best.set);
     match verdict {
-        Verdict::Unexplained => answer.hypothesis = Some(hypothesis(library, &best, &listed, open_wins)),
+        Verdict::Unexplained => {
+            answer.hypothesis = Some(match remains.filter(|_| !open_wins && !refused) {
+                Some(r) => of_remains(&r, &format!(" It remains beside {}.", ids(library, &best.set).join(" + "))),
+                None => hypothesis(library, &best, &listed, open_wins),
+            });
+        }
         _ => name(&mut answer, scene, library, &best, &listed),
     }
     answer.notes = notes;
     (answer, signal, ladder)
+}
+
+/// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.
+fn with_remains<'a>(
+    scene: &Scene,
+    library: &Library,
+    solution: &'a Solution,
+    (verdict, chosen): (Verdict, Option<&'a Weighed>),
+    claim: f64,
+) -> (Verdict, Option<&'a Weighed>, Option<Remains>) {
+    let weighed = chosen.unwrap_or(&solution.null);
+    let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let mut set = weighed.set.clone();
+    set.rewhiten(scene, &frame, &library.entries);
+    let left = search::residual(scene, &frame, &library.entries, &set);
+    let after = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &left);
+    let whitened: Axes = std::array::from_fn(|k| after.data.projected(k, &after));
+    let remains = remains::strongest(scene.clock_s(), &whitened, weighed.noise.map(|n| n.rms_ng()));
+    let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
+    let overturns = remains
+        .as_ref()
+        .is_some_and(|r| r.probability <= (1.0 - EVIDENCE_SHARE) * claim && r.energy > REMAINS_SHARE * explained);
+    match verdict {
+        Verdict::Consistent | Verdict::Explained if overturns => (Verdict::Unexplained, chosen, remains),
+        Verdict::Explained => (verdict, chosen, None),
+        _ => (verdict, chosen, remains),
+    }
+}
+
+fn of_remains(r: &Remains, beside: &str) -> Hypothesis {
+    Hypothesis {
+        formula: r.form.clone(),
+        axis: r.axis.clone(),
+        unit: "ng".into(),
+        location: format!("{}.{beside}", r.location),
+    }
 }
 
 /// Listed sets whose sizes can be believed; the others are refused, with the reason.
@@ -134,7 +189,7 @@ fn credible<'a>(scene: &Scene, library: &Library, sets: &'a [Weighed], notes: &m
         let frame = Frame::new(&w.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
         let mut set = w.set.clone();
         set.rewhiten(scene, &frame, &library.entries);
-        let (mean, _) = set.coefficients(&frame, &library.entries);
+        let (mean, covariance) = set.coefficients(&frame, &library.entries);
         let mut next = 0;
         let mut reason = None;
         for (i, m) in set.members.iter().enumerate() {
@@ -148,6 +203,13 @@ fn credible<'a>(scene: &Scene, library: &Library, sets: &'a [Weighed], notes: &m
                         mean[next + k],
                         l.unit,
                         l.size_max
+                    ));
+                }
+                let (fraction, doubt) = (mean[next + k], 2.0 * covariance[(next + k, next + k)].max(0.0).sqrt());
+                if l.whole && (fraction + doubt < WHOLE[0] || fraction - doubt > WHOLE[1]) {
+                    reason = Some(format!(
+                        "{} is refused: the term is left out or it is not, and {fraction:.2} of it is neither",
+                        effect.id
                     ));
                 }
             }
@@ -234,7 +296,7 @@ fn step_at_mass_change(scene: &Scene, library: &Library, best: &Best) -> Option<
         let raws = (effect.signature)(scene, theta).map(|s| s.columns()).unwrap_or_default();
         let columns: Vec<Column> =
             raws.iter().zip(&entry.sizes).map(|(raw, size)| best.frame.column(raw, *size)).collect();
-        chosen.gain(&columns)
+        chosen.normal(&columns).explained()
     };
     let Family::Listed(step_effect) = step.family else { return None };
     let m = &best.set.members[i];
@@ -322,7 +384,7 @@ fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins: bo
         formula.push(format!(
             "[{}] x {}, scaled to unit deviation",
             amplitudes.join(", "),
-            library.atoms[atom].formula
+            library.atoms[atom].forms[m.theta[0] as usize].formula
         ));
         axis.push(m.axis.map_or("x, y, z", |a| ["x", "y", "z"][a]));
         location.push(library.atoms[atom].location);

@@ -1,5 +1,6 @@
 //! Real recordings, measured by others; skipped, loudly, where they are not at hand.
 
+mod made;
 mod orbits;
 mod sensors;
 

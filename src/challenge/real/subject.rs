@@ -11,11 +11,13 @@ use crate::diagnose::orbit::report;
 use crate::diagnose::orbit::search::{Problem, estimates};
 use crate::diagnose::poses::still::Pose;
 use crate::diagnose::poses::{self, Part};
-use crate::diagnose::series::{self, Follows, read::Series};
+use crate::diagnose::series::{self, Follows, read::Series, search};
 use crate::diagnose::{orbit, poses as poses_room};
 
 /// A term can be drawn when the full model sees it at this many standard errors or more.
 const CLEAR: f64 = 12.0;
+/// Name of an axis' one linear coefficient: a slope, a step, a fraction.
+const COEFFICIENT: &str = "coefficient";
 /// Degrees of the field that a removal leaves; the lot takes one of them by the satellite's place in the list.
 const DEGREES_LEFT: [usize; 3] = [2, 3, 4];
 
@@ -66,6 +68,7 @@ fn orbits(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Vec<S
             baseline: full.clone(),
             arcs: vec![arc.clone()],
             sigma_m: all.sigma_m,
+            left_out: Vec::new(),
         };
         let level = problem.fit(&full, Vec::new(), None);
         let degree_left = DEGREES_LEFT[i % DEGREES_LEFT.len()];
@@ -123,17 +126,15 @@ fn axes(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Vec<Sub
     let series = series::read::series(case, files)?;
     let mut subjects = Vec::new();
     for (axis, own) in series.axes.iter().enumerate() {
-        let mut with_temperature = case.clone();
-        with_temperature.includes = vec!["constant".to_owned(), "temperature_bias".to_owned()];
-        let full = if own.control { Vec::new() } else { series::included(&with_temperature, &series, &own.values)? };
-        let fit = series::regress(&series, &own.values, &full);
-        let removable = match fit.coefficients.first() {
-            Some((value, sigma)) if value.abs() >= 2.0 * sigma => {
-                let coefficients = vec![parameter("slope", *value, *sigma, "")];
-                vec![Removable { id: "temperature_bias", coefficients }]
+        let full = if own.control { Vec::new() } else { search::search(&series, own, &[]).model() };
+        let fit = search::regress(&series, own, &full);
+        let mut removable = Vec::new();
+        for (follows, (value, sigma)) in full.iter().zip(&fit.coefficients) {
+            if value.abs() >= 2.0 * sigma {
+                let coefficients = vec![parameter(COEFFICIENT, *value, *sigma, "")];
+                removable.push(Removable { id: follows.id(), coefficients });
             }
-            _ => Vec::new(),
-        };
+        }
         let of = Of::Axis { series: Box::new(series.clone()), axis, full };
         subjects.push(Subject { id: format!("{} {}", case.id, own.column), removable, of });
     }
@@ -163,6 +164,7 @@ fn orbit_said(problem: &Problem, degree_left: usize, removed: &str) -> Said {
         baseline,
         arcs: problem.arcs.clone(),
         sigma_m: problem.sigma_m,
+        left_out: Vec::new(),
     };
     let answer = report::answer("", &reduced, &reduced.search(&mut |_| ()));
     let arc = &answer.arcs[0];
@@ -187,15 +189,17 @@ fn poses_said(poses: &[Pose], gravity: f64, removed: &str) -> Said {
 }
 
 fn axis_said(series: &Series, axis: usize, full: &[Follows], removed: &str) -> Said {
-    let left: Vec<Follows> = full.iter().filter(|f| f.id() != removed).cloned().collect();
-    let found = series::search(series, &series.axes[axis].values, &left);
-    let last = &found.fits[found.fits.len() - 1];
-    let slope =
-        |i: usize| parameter("slope", last.coefficients[left.len() + i].0, last.coefficients[left.len() + i].1, "");
+    let left: Vec<Follows> = full.iter().filter(|f| f.id() != removed).copied().collect();
+    let found = search::search(series, &series.axes[axis], &left);
+    let last = found.last();
+    let of = |i: usize| {
+        let (value, sigma) = last.coefficients[left.len() + i];
+        parameter(COEFFICIENT, value, sigma, "")
+    };
     Said {
         named: found.effects.iter().map(|(f, _)| f.id().to_owned()).collect(),
         verdict: if found.effects.is_empty() { "consistent" } else { "explained" }.to_owned(),
-        coefficients: (0..found.effects.len()).map(slope).collect(),
+        coefficients: (0..found.effects.len()).map(of).collect(),
         rms: [found.fits[0].rms(), last.rms()],
     }
 }

@@ -10,7 +10,7 @@ pub const EFFECT: Effect = Effect {
     equation: "fraction x a_d, a_d = -1/2 rho Cd A |v| v / m, v relative to co-rotating air",
     source: "density models are 15-20 % off, 50-70 % in storms",
     mistaken_for: &["scale_factor of the ram axis", "a bias in a fixed attitude", "atmosphere_corotation"],
-    linear: &[Linear { name: "fraction", unit: "1", size: 0.5, size_max: 3.0 }],
+    linear: &[Linear { name: "fraction", unit: "1", size: 0.5, size_max: 3.0, whole: false }],
     nonlinear: &[],
     log_prior: COMMON,
     grid: one_point,

@@ -13,9 +13,9 @@ pub const EFFECT: Effect = Effect {
     source: "standard mechanics; 409 ng per metre radial, 136 cross-track in LVLH at 300 km",
     mistaken_for: &["a bias in a single LVLH attitude", "mass_shift", "rotation"],
     linear: &[
-        Linear { name: "dx_m", unit: "m", size: 0.6, size_max: 3.0 },
-        Linear { name: "dy_m", unit: "m", size: 0.6, size_max: 3.0 },
-        Linear { name: "dz_m", unit: "m", size: 0.6, size_max: 3.0 },
+        Linear { name: "dx_m", unit: "m", size: 0.6, size_max: 3.0, whole: false },
+        Linear { name: "dy_m", unit: "m", size: 0.6, size_max: 3.0, whole: false },
+        Linear { name: "dz_m", unit: "m", size: 0.6, size_max: 3.0, whole: false },
     ],
     nonlinear: &[],
     log_prior: COMMON,

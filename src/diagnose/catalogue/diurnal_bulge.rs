@@ -11,7 +11,7 @@ pub const EFFECT: Effect = Effect {
     equation: "a_d x amplitude x cos psi",
     source: "density bulge near 14 h local time; 30-50 % of drag",
     mistaken_for: &["solar_radiation_pressure", "temperature_bias"],
-    linear: &[Linear { name: "amplitude", unit: "1", size: 0.4, size_max: 2.0 }],
+    linear: &[Linear { name: "amplitude", unit: "1", size: 0.4, size_max: 2.0, whole: false }],
     nonlinear: &[],
     log_prior: COMMON,
     grid: one_point,

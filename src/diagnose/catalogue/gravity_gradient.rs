@@ -12,7 +12,7 @@ pub const EFFECT: Effect = Effect {
     equation: "-G r, r the assumed offset of the sensor",
     source: "standard mechanics; 409 ng per metre radial at 300 km",
     mistaken_for: &["cg_offset"],
-    linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0 }],
+    linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0, whole: true }],
     nonlinear: &[],
     log_prior: COMMON,
     grid: one_point,

@@ -15,9 +15,9 @@ pub const EFFECT: Effect = Effect {
     source: "standard mechanics; 40-400 ng",
     mistaken_for: &["bias_step", "cg_offset"],
     linear: &[
-        Linear { name: "dx_m", unit: "m", size: 0.4, size_max: 3.0 },
-        Linear { name: "dy_m", unit: "m", size: 0.4, size_max: 3.0 },
-        Linear { name: "dz_m", unit: "m", size: 0.4, size_max: 3.0 },
+        Linear { name: "dx_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },
+        Linear { name: "dy_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },
+        Linear { name: "dz_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },
     ],
     nonlinear: &[Nonlinear {
         name: "onset_s",

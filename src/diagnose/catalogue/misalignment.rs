@@ -12,9 +12,9 @@ pub const EFFECT: Effect = Effect {
     source: "one class with a constant attitude error: never separable from acceleration alone",
     mistaken_for: &["atmosphere_corotation"],
     linear: &[
-        Linear { name: "rx_rad", unit: "rad", size: 0.08, size_max: 0.6 },
-        Linear { name: "ry_rad", unit: "rad", size: 0.08, size_max: 0.6 },
-        Linear { name: "rz_rad", unit: "rad", size: 0.08, size_max: 0.6 },
+        Linear { name: "rx_rad", unit: "rad", size: 0.08, size_max: 0.6, whole: false },
+        Linear { name: "ry_rad", unit: "rad", size: 0.08, size_max: 0.6, whole: false },
+        Linear { name: "rz_rad", unit: "rad", size: 0.08, size_max: 0.6, whole: false },
     ],
     nonlinear: &[],
     log_prior: COMMON,

@@ -99,7 +99,12 @@ pub struct Linear {
     pub size: f64,
     /// A value beyond this is not credible, whatever the fit.
     pub size_max: f64,
+    /// The simulation lacks the whole term or nothing of it: only a value about one is credible ([`WHOLE`]).
+    pub whole: bool,
 }
+
+/// Fractions at which the whole of a term is missing, given what its own model may be off by.
+pub const WHOLE: [f64; 2] = [0.4, 1.6];
 
 /// A nonlinear parameter.
 pub struct Nonlinear {
@@ -162,9 +167,9 @@ pub const RARE: f64 = -6.0;
 /// Three coefficients of a push fixed in the body.
 pub const fn push(size_ng: f64, size_max_ng: f64) -> [Linear; 3] {
     [
-        Linear { name: "ax_ng", unit: "ng", size: size_ng, size_max: size_max_ng },
-        Linear { name: "ay_ng", unit: "ng", size: size_ng, size_max: size_max_ng },
-        Linear { name: "az_ng", unit: "ng", size: size_ng, size_max: size_max_ng },
+        Linear { name: "ax_ng", unit: "ng", size: size_ng, size_max: size_max_ng, whole: false },
+        Linear { name: "ay_ng", unit: "ng", size: size_ng, size_max: size_max_ng, whole: false },
+        Linear { name: "az_ng", unit: "ng", size: size_ng, size_max: size_max_ng, whole: false },
     ]
 }
 

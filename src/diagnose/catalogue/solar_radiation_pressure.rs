@@ -12,7 +12,7 @@ pub const EFFECT: Effect = Effect {
     equation: "-nu coefficient P (sum |s_i| area_i) / m s, P = 4.56e-6 N/m2",
     source: "standard; 0.4-2 ng for the Orbiter, more with large panels",
     mistaken_for: &["temperature_bias, which lags", "diurnal_bulge"],
-    linear: &[Linear { name: "coefficient", unit: "1", size: 4.0, size_max: 40.0 }],
+    linear: &[Linear { name: "coefficient", unit: "1", size: 4.0, size_max: 40.0, whole: false }],
     nonlinear: &[],
     log_prior: COMMON,
     grid: one_point,

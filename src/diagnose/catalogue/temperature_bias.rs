@@ -12,9 +12,9 @@ pub const EFFECT: Effect = Effect {
     source: "4-30 counts per C, lagged 0-8 h",
     mistaken_for: &["solar_radiation_pressure", "crew_activity", "bias_drift"],
     linear: &[
-        Linear { name: "slope_x_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0 },
-        Linear { name: "slope_y_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0 },
-        Linear { name: "slope_z_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0 },
+        Linear { name: "slope_x_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, whole: false },
+        Linear { name: "slope_y_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, whole: false },
+        Linear { name: "slope_z_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, whole: false },
     ],
     nonlinear: &[Nonlinear { name: "lag_s", unit: "s", log: false, step: 200.0, range: [0.0, 28_800.0] }],
     log_prior: COMMON,

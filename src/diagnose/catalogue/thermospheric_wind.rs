@@ -12,8 +12,8 @@ pub const EFFECT: Effect = Effect {
     source: "200 m/s change drag by 2.6 %",
     mistaken_for: &["atmosphere_corotation", "aerodynamic_drag"],
     linear: &[
-        Linear { name: "along_m_s", unit: "m/s", size: 150.0, size_max: 800.0 },
-        Linear { name: "cross_m_s", unit: "m/s", size: 150.0, size_max: 800.0 },
+        Linear { name: "along_m_s", unit: "m/s", size: 150.0, size_max: 800.0, whole: false },
+        Linear { name: "cross_m_s", unit: "m/s", size: 150.0, size_max: 800.0, whole: false },
     ],
     nonlinear: &[],
     log_prior: RARE,

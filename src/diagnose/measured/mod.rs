@@ -4,6 +4,7 @@
 //! command reads them), and the windows of the accelerometer (`diagnose::case`).
 
 pub mod answer;
+pub mod plates;
 pub mod spread;
 
 use std::collections::BTreeMap;
@@ -11,6 +12,7 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 pub use answer::Answer;
+pub use plates::Plates;
 
 use crate::diagnose::orbit::{self, OrbitError};
 
@@ -154,6 +156,11 @@ impl MeasuredCase {
 
 /// Analyse a case; `files` holds the text of every file that [`MeasuredCase::files`] names.
 pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Answer, MeasuredError> {
+    analyse(case, files).map(|(answer, _)| answer)
+}
+
+/// The same, with the numbers behind its figures.
+pub fn analyse(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
     for name in case.files() {
         if !files.contains_key(&name) {
             return Err(MeasuredError::MissingFile { file: name });

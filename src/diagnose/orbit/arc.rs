@@ -3,7 +3,7 @@
 //!
 //! A step never straddles an edge of the shadow. Not here: which terms to fit (see `search`).
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 
 use super::OrbitError;
 use super::forces::{Baseline, Environment, Moment, Term, sunlit};
@@ -19,7 +19,14 @@ const STEPS_PER_REVOLUTION: f64 = 40.0;
 const SHADOW_LOOKS: usize = 24;
 /// A shadow's edge is placed to this, s: at 1e-7 m/s^2 that is 1e-9 m/s.
 const EDGE_S: f64 = 0.01;
-const ITERATIONS_MAX: usize = 12;
+/// Up to this angle between two points the polynomial through nine gives the velocity to a part in 1e4.
+const SMOOTH_RAD: f64 = 0.35;
+const ITERATIONS_MAX: usize = 16;
+/// A first fit begins with this part of a revolution and grows by this factor, so that a rough first state is enough.
+const FIRST_REVOLUTIONS: f64 = 0.3;
+const GROWTH: f64 = 4.0;
+/// Fewest epochs of such a fit.
+const FIRST_EPOCHS: usize = 6;
 /// Positions that change by less than this between iterations have converged, m.
 const CONVERGED_M: f64 = 1e-4;
 
@@ -40,6 +47,15 @@ pub struct Arc {
     step_s: f64,
 }
 
+/// A velocity step at an instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impulse {
+    /// Seconds after the recording's origin.
+    pub at_s: f64,
+    /// Inertial, m/s.
+    pub dv_m_s: Vector3<f64>,
+}
+
 /// What a fit leaves.
 #[derive(Debug, Clone)]
 pub struct ArcFit {
@@ -53,6 +69,10 @@ pub struct ArcFit {
     pub partials: DMatrix<f64>,
     /// The term each further column belongs to, scaled by [`Term::scale`].
     pub columns: Vec<(Term, usize)>,
+    /// A velocity step in the model; its four columns (three of velocity, one of its instant) stand after all others.
+    pub impulse: Option<Impulse>,
+    /// State at each epoch against the state at the first.
+    pub transitions: Vec<Matrix6<f64>>,
 }
 
 impl Arc {
@@ -65,7 +85,9 @@ impl Arc {
             return Err(OrbitError::TooFew { id: track.id.clone(), found: fitted, expected: 12 });
         }
         let start = first_state(&track.t_s, &observed_m, environment.field.gm_m3_s2());
-        let rate = (environment.field.gm_m3_s2() / start.r.norm().powi(3)).sqrt();
+        // The fastest part of the orbit sets the step.
+        let lowest = observed_m.iter().map(|r| r.norm()).fold(f64::INFINITY, f64::min);
+        let rate = (environment.field.gm_m3_s2() / lowest.powi(3)).sqrt();
         let step_s = std::f64::consts::TAU / rate / STEPS_PER_REVOLUTION;
         let (id, masked) = (track.id.clone(), track.masked);
         Ok(Self { id, t_s: track.t_s.clone(), observed_m, fitted, masked, start, step_s })
@@ -77,8 +99,8 @@ impl Arc {
         lowest - crate::physics::third_body::EARTH_RADIUS_M
     }
 
-    /// Fit the state and the coefficients of `active`, and give partials for `active` and `candidates`.
-    /// `from` starts the iteration (an earlier fit of the same arc).
+    /// Fit the state and the coefficients of `active` (and the velocity step of `from`, where it has one), and give partials
+    /// for `active` and `candidates`. `from` starts the iteration (an earlier fit of the same arc).
     pub fn fit(
         &self,
         environment: &Environment,
@@ -88,24 +110,51 @@ impl Arc {
         from: Option<&ArcFit>,
     ) -> ArcFit {
         let mut fit = self.first_guess(active, &[], from);
-        for _ in 0..ITERATIONS_MAX {
-            self.propagate(environment, baseline, &mut fit);
-            let unknowns = 6 + active.iter().map(|term| term.parameters().len()).sum::<usize>();
-            let rows = 3 * self.fitted;
-            let design = fit.partials.view((0, 0), (rows, unknowns)).into_owned();
-            let residuals =
-                DVector::from_iterator(rows, fit.residuals_m[..self.fitted].iter().flat_map(|r| [r.x, r.y, r.z]));
-            let Some(step) = solve(&design, &residuals) else { break };
-            let moved_m = (&design * &step).amax();
-            self.apply(&mut fit, &step);
-            if moved_m < CONVERGED_M {
-                break;
+        if from.is_none() {
+            // The state alone, over a growing part of the arc.
+            let mut bare = self.first_guess(&[], &[], None);
+            let mut span_s = FIRST_REVOLUTIONS * STEPS_PER_REVOLUTION * self.step_s;
+            while span_s < self.t_s[self.fitted - 1] - self.t_s[0] {
+                let epochs =
+                    self.t_s.partition_point(|t| *t <= self.t_s[0] + span_s).max(FIRST_EPOCHS).min(self.fitted);
+                self.iterate(environment, baseline, &mut bare, epochs);
+                span_s *= GROWTH;
             }
+            fit.start = bare.start;
         }
+        self.iterate(environment, baseline, &mut fit, self.fitted);
         // The candidates' columns are wanted once only, along the orbit that was found.
         fit.columns = self.first_guess(active, candidates, None).columns;
-        self.propagate(environment, baseline, &mut fit);
+        self.propagate(environment, baseline, &mut fit, self.t_s.len());
         fit
+    }
+
+    /// Gauss-Newton over the first epochs.
+    fn iterate(&self, environment: &Environment, baseline: &Baseline, fit: &mut ArcFit, epochs: usize) {
+        let mut best: Option<(f64, ArcFit)> = None;
+        for _ in 0..ITERATIONS_MAX {
+            self.propagate(environment, baseline, fit, epochs);
+            let rms = fit.rms_m(0..epochs);
+            if best.as_ref().is_none_or(|(least, _)| rms < *least) {
+                best = Some((rms, fit.clone()));
+            }
+            let design = fit.partials.view((0, 0), (3 * epochs, fit.partials.ncols())).into_owned();
+            let residuals =
+                DVector::from_iterator(3 * epochs, fit.residuals_m[..epochs].iter().flat_map(|r| [r.x, r.y, r.z]));
+            let Some(step) = solve(&design, &residuals) else { break };
+            let moved_m = (&design * &step).amax();
+            if !moved_m.is_finite() {
+                break;
+            }
+            self.apply(fit, &step);
+            if moved_m < CONVERGED_M {
+                return;
+            }
+        }
+        // Not converged: the best that was seen, rather than wherever the last step went.
+        if let Some((_, seen)) = best {
+            *fit = seen;
+        }
     }
 
     fn first_guess(&self, active: &[Term], candidates: &[Term], from: Option<&ArcFit>) -> ArcFit {
@@ -121,6 +170,8 @@ impl Arc {
             residuals_m: Vec::new(),
             partials: DMatrix::zeros(0, 0),
             columns: active.iter().chain(others).flat_map(of).collect(),
+            impulse: from.and_then(|fit| fit.impulse),
+            transitions: Vec::new(),
         }
     }
 
@@ -134,43 +185,126 @@ impl Arc {
                 next += 1;
             }
         }
+        if let Some(impulse) = &mut fit.impulse {
+            impulse.dv_m_s += Vector3::new(step[next], step[next + 1], step[next + 2]);
+            let (first, last) = (self.t_s[1], self.t_s[self.fitted - 2]);
+            impulse.at_s = (impulse.at_s + step[next + 3].clamp(-7_200.0, 7_200.0)).clamp(first, last);
+        }
     }
 
-    /// Integrate over all epochs, filling residuals and partials.
-    fn propagate(&self, environment: &Environment, baseline: &Baseline, fit: &mut ArcFit) {
+    /// Integrate over the first epochs, filling residuals and partials.
+    fn propagate(&self, environment: &Environment, baseline: &Baseline, fit: &mut ArcFit, epochs: usize) {
         let flight = Flight { environment, baseline, gauss: Collocation::gauss(STAGES) };
-        let columns = 6 + fit.columns.len();
+        let columns = 6 + fit.columns.len() + if fit.impulse.is_some() { 4 } else { 0 };
         let zero = State { r: Vector3::zeros(), v: Vector3::zeros() };
         let mut carried = vec![zero; columns];
         for axis in 0..3 {
             carried[axis].r[axis] = 1.0;
             carried[axis + 3].v[axis] = 1.0;
         }
-        fit.partials = DMatrix::zeros(3 * self.t_s.len(), columns);
-        fit.residuals_m = Vec::with_capacity(self.t_s.len());
+        fit.partials = DMatrix::zeros(3 * epochs, columns);
+        fit.residuals_m = Vec::with_capacity(epochs);
+        fit.transitions = Vec::with_capacity(epochs);
         let (mut state, mut t) = (fit.start, self.t_s[0]);
-        for (i, &epoch) in self.t_s.iter().enumerate() {
-            let parts = ((epoch - t) / self.step_s).ceil().max(1.0);
-            let h = (epoch - t) / parts;
-            for part in 0..parts as usize {
-                if h > 0.0 {
-                    state = flight.advance(t + part as f64 * h, state, h, fit, &mut carried);
-                }
+        for (i, &epoch) in self.t_s[..epochs].iter().enumerate() {
+            if let Some(impulse) = fit.impulse.filter(|impulse| impulse.at_s > t && impulse.at_s <= epoch) {
+                state = self.advance(&flight, (t, impulse.at_s), state, fit, &mut carried);
+                kick(&impulse, &mut state, &mut carried);
+                t = impulse.at_s;
             }
+            state = self.advance(&flight, (t, epoch), state, fit, &mut carried);
             t = epoch;
             fit.residuals_m.push(self.observed_m[i] - state.r);
             for (k, column) in carried.iter().enumerate() {
                 fit.partials.fixed_view_mut::<3, 1>(3 * i, k).copy_from(&column.r);
             }
+            let of = |row: usize, k: usize| if row < 3 { carried[k].r[row] } else { carried[k].v[row - 3] };
+            fit.transitions.push(Matrix6::from_fn(of));
         }
     }
+
+    fn advance(
+        &self,
+        flight: &Flight,
+        (from, to): (f64, f64),
+        mut state: State,
+        fit: &ArcFit,
+        carried: &mut [State],
+    ) -> State {
+        let parts = ((to - from) / self.step_s).ceil().max(1.0);
+        let h = (to - from) / parts;
+        for part in 0..parts as usize {
+            if h > 0.0 {
+                state = flight.advance(from + part as f64 * h, state, h, fit, carried);
+            }
+        }
+        state
+    }
+}
+
+/// A velocity step, and what it does to the columns: later by dt, it leaves the satellite `dv dt` behind.
+fn kick(impulse: &Impulse, state: &mut State, carried: &mut [State]) {
+    state.v += impulse.dv_m_s;
+    let first = carried.len() - 4;
+    for axis in 0..3 {
+        carried[first + axis].v[axis] = 1.0;
+    }
+    carried[first + 3].r = -impulse.dv_m_s;
+}
+
+/// Positions and velocities of a satellite that starts in `start` at the first of `t_s` and feels a baseline and further
+/// terms: a recording made to order. `kick` is a velocity step on the way.
+pub fn fly(
+    environment: &Environment,
+    baseline: &Baseline,
+    terms: &[(Term, [f64; 2])],
+    start: State,
+    t_s: &[f64],
+    kick: Option<Impulse>,
+) -> Vec<State> {
+    let flight = Flight { environment, baseline, gauss: Collocation::gauss(STAGES) };
+    let fit = ArcFit {
+        start,
+        coefficients: terms.to_vec(),
+        residuals_m: Vec::new(),
+        partials: DMatrix::zeros(0, 0),
+        columns: Vec::new(),
+        impulse: None,
+        transitions: Vec::new(),
+    };
+    let rate = (environment.field.gm_m3_s2() / start.r.norm().powi(3)).sqrt();
+    // Half the analyser's step: the two must agree because both are right, not because they are the same.
+    let step_s = 0.5 * std::f64::consts::TAU / rate / STEPS_PER_REVOLUTION;
+    let (mut state, mut t) = (start, t_s[0]);
+    let mut out = Vec::with_capacity(t_s.len());
+    let to = |state: &mut State, t: &mut f64, end: f64| {
+        let parts = ((end - *t) / step_s).ceil().max(1.0);
+        let h = (end - *t) / parts;
+        for part in 0..parts as usize {
+            if h > 0.0 {
+                *state = flight.advance(*t + part as f64 * h, *state, h, &fit, &mut []);
+            }
+        }
+        *t = end;
+    };
+    for &epoch in t_s {
+        if let Some(kick) = kick.filter(|kick| kick.at_s > t && kick.at_s <= epoch) {
+            to(&mut state, &mut t, kick.at_s);
+            state.v += kick.dv_m_s;
+        }
+        to(&mut state, &mut t, epoch);
+        out.push(state);
+    }
+    out
 }
 
 impl ArcFit {
     /// Rms of the 3-D residual over a range of epochs, m.
     pub fn rms_m(&self, epochs: std::ops::Range<usize>) -> f64 {
         let n = epochs.len().max(1) as f64;
-        (self.residuals_m[epochs].iter().map(|r| r.norm_squared()).sum::<f64>() / n).sqrt()
+        let rms = (self.residuals_m[epochs].iter().map(|r| r.norm_squared()).sum::<f64>() / n).sqrt();
+        // An orbit that could not be followed is infinitely far off.
+        if rms.is_nan() { f64::INFINITY } else { rms }
     }
 
     /// Coefficients of a fitted term.
@@ -236,6 +370,9 @@ impl Flight<'_> {
     }
 
     fn carry(&self, step: &Step, fit: &ArcFit, carried: &mut [State]) {
+        if carried.is_empty() {
+            return;
+        }
         let gradient = self.gradients(step);
         let moments: Vec<Moment> = self
             .gauss
@@ -246,7 +383,7 @@ impl Flight<'_> {
             .collect();
         let quiet = [Vector3::zeros(); STAGES];
         for (k, column) in carried.iter_mut().enumerate() {
-            let forcing: Vec<Vector3<f64>> = match k.checked_sub(6) {
+            let forcing: Vec<Vector3<f64>> = match k.checked_sub(6).filter(|j| *j < fit.columns.len()) {
                 None => quiet.to_vec(),
                 Some(j) => {
                     let (term, part) = fit.columns[j];
@@ -314,10 +451,10 @@ fn first_state(t_s: &[f64], r_m: &[Vector3<f64>], gm: f64) -> State {
     let (ahead, behind) = (lagrange_weights(&nodes, delta), lagrange_weights(&nodes, -delta));
     let slope: Vector3<f64> = (0..n).map(|i| r_m[i] * ((ahead[i] - behind[i]) / (2.0 * delta))).sum();
     let first = r_m[0];
-    if n >= 7 {
+    let rate = (gm / first.norm().powi(3)).sqrt();
+    if n >= 7 && rate * spacing < SMOOTH_RAD {
         return State { r: first, v: slope };
     }
-    let rate = (gm / first.norm().powi(3)).sqrt();
     let (sin, cos) = (rate * spacing).sin_cos();
     State { r: first, v: (r_m[1] - first * cos) * (rate / sin) }
 }

@@ -2,6 +2,7 @@
 
 pub mod arc;
 pub mod forces;
+pub mod manoeuvre;
 pub mod report;
 pub mod search;
 pub mod sp3;
@@ -13,7 +14,7 @@ use thiserror::Error;
 use self::arc::Arc;
 use self::forces::{Baseline, Environment, Term};
 use self::search::Problem;
-use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, lookup, texts};
+use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates, lookup, texts};
 use crate::physics::earth_orientation::{EarthOrientation, EarthOrientationError};
 use crate::physics::gravity_field::{GravityField, GravityFieldError};
 
@@ -68,10 +69,10 @@ pub enum OrbitError {
 }
 
 /// Analyse an orbit case.
-pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Answer, MeasuredError> {
+pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
     let problem = problem(case, files)?;
     let search = problem.search(&mut |_| ());
-    Ok(report::answer(&case.id, &problem, &search))
+    Ok((report::answer(&case.id, &problem, &search), report::plates(&problem, &search)))
 }
 
 /// The case's arcs and forces.
@@ -92,14 +93,14 @@ pub fn problem(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<
         return Err(case.wrong("recording.position_sigma_m", "a number above zero"));
     }
     let wanted = wanted(case)?;
-    let mut arcs = Vec::new();
+    let (mut arcs, mut left_out) = (Vec::new(), Vec::new());
     for track in &recording.tracks {
         if wanted.as_ref().is_none_or(|ids| ids.contains(&track.id)) {
             match Arc::new(track, &environment, fit_s) {
                 Ok(arc) => arcs.push(arc),
                 // Asked for by name, or the only one: say what is wrong. Among many, one too short is left out.
                 Err(error) if wanted.is_some() || recording.tracks.len() == 1 => return Err(error.into()),
-                Err(_) => {}
+                Err(error) => left_out.push(error.to_string()),
             }
         }
     }
@@ -107,7 +108,7 @@ pub fn problem(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<
         let what = wanted.map_or("a satellite".to_owned(), |ids| format!("any of the satellites {}", ids.join(", ")));
         return Err(OrbitError::Empty { what }.into());
     }
-    Ok(Problem { environment, baseline: baseline(case)?, arcs, sigma_m })
+    Ok(Problem { environment, baseline: baseline(case)?, arcs, sigma_m, left_out })
 }
 
 fn wanted(case: &MeasuredCase) -> Result<Option<Vec<String>>, MeasuredError> {

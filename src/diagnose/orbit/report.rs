@@ -2,13 +2,15 @@
 
 use super::arc::{Arc, ArcFit};
 use super::forces::Term;
+use super::manoeuvre::Manoeuvre;
 use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m};
 use crate::diagnose::answer::{Alternative, Interval, Located, ParameterAnswer, Verdict};
-use crate::diagnose::measured::Answer;
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, StepAnswer, parameter, posterior,
 };
+use crate::diagnose::measured::plates::OrbitPlate;
 use crate::diagnose::measured::spread::{median, scatter};
+use crate::diagnose::measured::{Answer, Plates};
 
 /// Every arc's estimates of every accepted term.
 pub type Table = Vec<(Term, f64, Vec<Vec<Estimate>>)>;
@@ -19,14 +21,18 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
     let table = table(problem, last);
     let arcs: Vec<ArcAnswer> = (0..problem.arcs.len()).map(|i| arc_answer(problem, search, &table, i)).collect();
     let unexplained = arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).count();
-    let verdict = match (table.is_empty(), 2 * unexplained > arcs.len()) {
+    let nothing = table.is_empty() && search.manoeuvres.is_empty();
+    let verdict = match (nothing, 2 * unexplained > arcs.len()) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::Consistent,
         (false, false) => Verdict::Explained,
     };
-    let effects = common_effects(problem, search, &table);
+    let mut effects = common_effects(problem, search, &table);
+    // A velocity step of one satellite among many is that satellite's, and named there and here with its name.
+    effects.extend(search.manoeuvres.iter().map(|one| manoeuvre_effect(problem, one, problem.arcs.len() > 1)));
     let strongest_refused = search.refused.first().map_or(0.0, |(_, score)| *score);
-    let weakest = table.iter().map(|(_, score, _)| *score).fold(f64::INFINITY, f64::min);
+    let scores = table.iter().map(|(_, score, _)| *score).chain(search.manoeuvres.iter().map(|one| one.score));
+    let weakest = scores.fold(f64::INFINITY, f64::min);
     let false_alarm_probability = match verdict {
         Verdict::Explained => (-0.5 * weakest).exp().clamp(1e-12, 1.0),
         Verdict::Unexplained => (-0.5 * SCORE_MIN).exp(),
@@ -37,7 +43,7 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
         case: case.to_owned(),
         verdict,
         false_alarm_probability,
-        located: located(problem, &arcs, table.is_empty()),
+        located: located(problem, search, &arcs, nothing),
         alternatives: alternatives(search, &table),
         hypothesis: None,
         unit: "m".to_owned(),
@@ -50,6 +56,23 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
         effects,
         arcs,
     }
+}
+
+/// Numbers for the figures.
+pub fn plates(problem: &Problem, search: &Search) -> Plates {
+    let each = |of: &dyn Fn(&Arc, &ArcFit) -> Option<f64>| {
+        let level =
+            |level: &Level| problem.arcs.iter().zip(&level.fits).filter_map(|(arc, fit)| of(arc, fit)).collect();
+        search.levels.iter().map(level).collect::<Vec<Vec<f64>>>()
+    };
+    let added = |level: &Level| level.accepted.last().map_or("as it stands", |(term, _)| term.id()).to_owned();
+    Plates::Orbit(OrbitPlate {
+        arcs: problem.arcs.iter().map(|arc| arc.id.clone()).collect(),
+        added: search.levels.iter().map(added).collect(),
+        rms_m: each(&|arc, fit| Some(fit.rms_m(0..arc.fitted))),
+        predicted_m: each(&predicted_m),
+        rms_max_m: problem.rms_max_m(),
+    })
 }
 
 /// Estimates of every accepted term in every arc.
@@ -75,6 +98,35 @@ fn effect(term: Term, score: f64, parameters: Vec<ParameterAnswer>, why: String,
     };
     let (id, name) = (term.id().to_owned(), term.name().to_owned());
     Effect { id, name, posterior: posterior(score), parameters, axis: None, from_degree, why, rms }
+}
+
+fn manoeuvre_effect(problem: &Problem, one: &Manoeuvre, of_many: bool) -> Effect {
+    let [radial, along, cross] = one.rtn_m_s;
+    let number = |name: &str, (value, sigma): (f64, f64), unit: &str| parameter(name, value, sigma, unit);
+    let parameters = vec![
+        number("at_s", (one.impulse.at_s, one.at_sigma_s), "s"),
+        number("dv_m_s", one.dv_m_s, "m/s"),
+        number("radial_m_s", radial, "m/s"),
+        number("along_m_s", along, "m/s"),
+        number("cross_m_s", cross, "m/s"),
+    ];
+    let id = &problem.arcs[one.arc].id;
+    let why = format!(
+        "{}One velocity step takes the 3-D residual of the arc from {:.3} m to {:.3} m.",
+        if of_many { format!("{id} alone: ") } else { String::new() },
+        one.rms_m[0],
+        one.rms_m[1]
+    );
+    Effect {
+        id: "manoeuvre".to_owned(),
+        name: "Velocity step".to_owned(),
+        posterior: posterior(one.score),
+        parameters,
+        axis: None,
+        from_degree: None,
+        why,
+        rms: vec![one.rms_m[1]],
+    }
 }
 
 fn with_degree(term: Term, mut parameters: Vec<ParameterAnswer>) -> Vec<ParameterAnswer> {
@@ -139,10 +191,17 @@ fn arc_answer(problem: &Problem, search: &Search, table: &Table, i: usize) -> Ar
         let why = format!("3-D residual of this arc from {was:.3} m to {is:.3} m.");
         effects.push(effect(*term, evidence(arc, before, *term), parameters, why, vec![is]));
     }
+    effects
+        .extend(search.manoeuvres.iter().filter(|one| one.arc == i).map(|one| manoeuvre_effect(problem, one, false)));
     let left = rms_after > problem.rms_max_m();
     let (verdict, effects, fitted_beside, note) = if left {
         let note = format!(
-            "{rms_after:.3} m remain where {:.3} m is the most that the stated accuracy allows; nothing in the catalogue removes it.",
+            "{} remain where {:.3} m is the most that the stated accuracy allows; nothing in the catalogue removes it.",
+            if rms_after.is_finite() {
+                format!("{rms_after:.3} m")
+            } else {
+                "No orbit follows the positions: they".to_owned()
+            },
             problem.rms_max_m()
         );
         (Verdict::Unexplained, Vec::new(), effects, Some(note))
@@ -156,7 +215,13 @@ fn arc_answer(problem: &Problem, search: &Search, table: &Table, i: usize) -> Ar
         verdict,
         effects,
         fitted_beside,
-        rms_before: first.fits[i].rms_m(0..arc.fitted),
+        // The first level may hold the arc's velocity step already.
+        rms_before: search
+            .manoeuvres
+            .iter()
+            .filter(|one| one.arc == i)
+            .map(|one| one.rms_m[0])
+            .fold(first.fits[i].rms_m(0..arc.fitted), f64::max),
         rms_after,
         predicted_rms: predicted_m(arc, fit),
         fitted: arc.fitted,
@@ -241,7 +306,7 @@ fn alternatives(search: &Search, table: &Table) -> Vec<Alternative> {
     others.take(3).map(one).collect()
 }
 
-fn located(problem: &Problem, arcs: &[ArcAnswer], nothing: bool) -> Located {
+fn located(problem: &Problem, search: &Search, arcs: &[ArcAnswer], nothing: bool) -> Located {
     let odd: Vec<&ArcAnswer> = arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).collect();
     if nothing && odd.is_empty() {
         return Located::default();
@@ -252,10 +317,18 @@ fn located(problem: &Problem, arcs: &[ArcAnswer], nothing: bool) -> Located {
         Some(Interval { start_s, end_s, why: format!("{}: {:.3} m unexplained", arc.id, arc.rms_after) })
     };
     let axes = ["radial", "along", "cross"].map(str::to_owned).to_vec();
+    let kicked = |one: &Manoeuvre| {
+        let own = &problem.arcs[one.arc];
+        Interval {
+            start_s: one.impulse.at_s,
+            end_s: own.t_s[own.fitted - 1],
+            why: format!("{}: velocity step", own.id),
+        }
+    };
     Located {
         axes,
         frame: "lvlh".to_owned(),
-        intervals: odd.iter().filter_map(interval).collect(),
+        intervals: odd.iter().filter_map(interval).chain(search.manoeuvres.iter().map(kicked)).collect(),
         ..Located::default()
     }
 }
@@ -270,6 +343,9 @@ fn notes(problem: &Problem, arcs: &[ArcAnswer]) -> Vec<String> {
     let masked: usize = problem.arcs.iter().map(|arc| arc.masked).sum();
     if masked > 0 {
         notes.push(format!("{masked} epochs were missing or unusable and are left out."));
+    }
+    if !problem.left_out.is_empty() {
+        notes.push(format!("Left out: {}.", problem.left_out.join("; ")));
     }
     let odd: Vec<&str> =
         arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).map(|arc| arc.id.as_str()).collect();

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::arc::{Arc, ArcFit};
 use super::forces::{Baseline, Environment, Moment, Term};
+use super::manoeuvre::{self, Manoeuvre};
 use crate::diagnose::measured::spread::{median, memory};
 use crate::physics::integrator::State;
 
@@ -19,11 +20,12 @@ const SCORE_ARC_MAX: f64 = 100.0;
 /// Unlisted accelerations (radiation from the Earth, antennas, attitude: 1e-10 m/s^2) leave up to this many times the stated
 /// accuracy in an arc of two days, which is no finding; beyond it something is there.
 const EXCESS_MAX: f64 = 4.0;
+const EXCESS_SPAN_S: f64 = 2.0 * 86_400.0;
 /// Where there is no air, drag is no candidate, m.
 const AIR_TOP_M: f64 = 1.5e6;
 /// The size of those unlisted accelerations against which a known pull can be weighed (tides' finer terms, the Moon's
 /// analytic place, radiation from the Earth), m/s^2.
-const UNLISTED_M_S2: f64 = 3e-10;
+pub(super) const UNLISTED_M_S2: f64 = 3e-10;
 const STEPS_MAX: usize = 10;
 
 /// What is to be explained.
@@ -36,6 +38,8 @@ pub struct Problem {
     pub arcs: Vec<Arc>,
     /// Accuracy of a coordinate, m.
     pub sigma_m: f64,
+    /// Satellites of the recording with too few positions to fit.
+    pub left_out: Vec<String>,
 }
 
 /// A model and its fits.
@@ -66,6 +70,8 @@ pub struct Search {
     pub first_scores: Vec<(Term, f64)>,
     /// Candidates not accepted at the end, with their evidence.
     pub refused: Vec<(Term, f64)>,
+    /// Velocity steps of single satellites, with the last level's errors.
+    pub manoeuvres: Vec<Manoeuvre>,
 }
 
 impl Problem {
@@ -85,58 +91,89 @@ impl Problem {
 
     /// Fit every arc to a model.
     pub fn fit(&self, baseline: &Baseline, accepted: Vec<(Term, f64)>, from: Option<&[ArcFit]>) -> Level {
-        let candidates = self.candidates(baseline);
-        let active = &baseline.estimated;
-        let one = |(i, arc): (usize, &Arc)| {
-            arc.fit(&self.environment, baseline, active, &candidates, from.map(|fits| &fits[i]))
-        };
+        let one = |(i, arc): (usize, &Arc)| self.fit_arc(arc, baseline, from.map(|fits| &fits[i]));
         Level { baseline: baseline.clone(), accepted, fits: self.arcs.iter().enumerate().map(one).collect() }
+    }
+
+    /// Fit one arc to a model.
+    pub fn fit_arc(&self, arc: &Arc, baseline: &Baseline, from: Option<&ArcFit>) -> ArcFit {
+        arc.fit(&self.environment, baseline, &baseline.estimated, &self.candidates(baseline), from)
     }
 
     /// Search. `report` is called after every level, for progress.
     pub fn search(&self, report: &mut dyn FnMut(usize)) -> Search {
+        let found = self.search_with(true, report);
+        // A velocity step taken on the way that leaves an arc odd in the end may have misled the rest: once more without.
+        if manoeuvre::unproven(self, &found.levels[found.levels.len() - 1]).is_empty() {
+            return found;
+        }
+        self.search_with(false, report)
+    }
+
+    fn search_with(&self, steps_of_velocity: bool, report: &mut dyn FnMut(usize)) -> Search {
         let mut levels = vec![self.fit(&self.baseline, Vec::new(), None)];
         let mut first_scores = Vec::new();
         let mut refused = Vec::new();
         for step in 0..STEPS_MAX {
             report(step);
-            let level = &levels[levels.len() - 1];
-            let mut scores = self.scores(level);
+            let last = levels.len() - 1;
+            let mut scores = self.scores(&levels[last]);
             scores.sort_by(|a, b| b.1.total_cmp(&a.1));
             if step == 0 {
                 first_scores.clone_from(&scores);
             }
-            match scores.first() {
-                Some(&(term, score)) if score > SCORE_MIN => {
-                    let mut accepted = level.accepted.clone();
-                    accepted.push((term, score));
-                    let next = self.fit(&with(&level.baseline, term), accepted, Some(&level.fits));
-                    levels.push(next);
-                }
-                _ => {
-                    refused = scores;
-                    break;
-                }
+            let best = scores.first().filter(|(_, score)| *score > SCORE_MIN).copied();
+            let rivals: Vec<f64> = (0..self.arcs.len()).map(|i| self.left_with(&levels[last], i, best)).collect();
+            if let Some(with) = steps_of_velocity.then(|| manoeuvre::step(self, &levels[last], &rivals)).flatten() {
+                levels[last] = with;
+                continue;
             }
+            let Some((term, score)) = best else {
+                refused = scores;
+                break;
+            };
+            let mut accepted = levels[last].accepted.clone();
+            accepted.push((term, score));
+            let next = self.fit(&with(&levels[last].baseline, term), accepted, Some(&levels[last].fits));
+            levels.push(next);
         }
         let levels = self.look_back(levels);
-        Search { levels, first_scores, refused }
+        let manoeuvres = manoeuvre::found(self, &levels[levels.len() - 1]);
+        Search { levels, first_scores, refused, manoeuvres }
+    }
+
+    /// Rms that one arc would keep with a term (as it stands without one), by its linear columns, m.
+    fn left_with(&self, level: &Level, i: usize, best: Option<(Term, f64)>) -> f64 {
+        let (arc, fit) = (&self.arcs[i], &level.fits[i]);
+        let now = fit.rms_m(0..arc.fitted);
+        let Some((term, _)) = best else { return now };
+        let projected = rows_of(arc, fit, |_| true, term);
+        let Some(step) = super::arc::solve(&projected.columns, &projected.residual) else { return now };
+        let left = (&projected.residual - &projected.columns * step).norm_squared();
+        (left / arc.fitted as f64).sqrt()
     }
 
     /// Drop terms that the last level can do without, and walk the way there once more in the catalogue's order, large
     /// and general terms first, so that every step of the answer stands on what is known by then.
     fn look_back(&self, levels: Vec<Level>) -> Vec<Level> {
         let last = &levels[levels.len() - 1];
-        if last.accepted.len() < 2 {
+        if last.accepted.is_empty() {
             return levels;
         }
         let needed = |(term, _): &&(Term, f64)| term.is_known_size() || self.loss_without(last, *term) >= SCORE_MIN;
         let mut kept: Vec<(Term, f64)> = last.accepted.iter().filter(needed).copied().collect();
         kept.sort_by_key(|(term, _)| *term);
-        if kept == last.accepted {
+        if kept == last.accepted && levels.iter().all(|level| kicks(level) == kicks(last)) {
             return levels;
         }
-        let mut walked = vec![levels[0].clone()];
+        let mut first = levels[0].clone();
+        for (i, (fit, final_fit)) in first.fits.iter_mut().zip(&last.fits).enumerate() {
+            if fit.impulse != final_fit.impulse {
+                let from = ArcFit { impulse: final_fit.impulse, ..fit.clone() };
+                *fit = self.fit_arc(&self.arcs[i], &self.baseline, Some(&from));
+            }
+        }
+        let mut walked = vec![first];
         for (term, score) in kept {
             let level = &walked[walked.len() - 1];
             let mut accepted = level.accepted.clone();
@@ -164,9 +201,10 @@ impl Problem {
         self.arcs.iter().zip(&level.fits).map(one).sum()
     }
 
-    /// Rms beyond which an arc is called unexplained, m.
+    /// Rms beyond which an arc is called unexplained, m. What is unlisted grows with the length of the arc.
     pub fn rms_max_m(&self) -> f64 {
-        EXCESS_MAX * 3f64.sqrt() * self.sigma_m
+        let longest_s = self.arcs.iter().map(|arc| arc.t_s[arc.fitted - 1] - arc.t_s[0]).fold(0.0, f64::max);
+        EXCESS_MAX * 3f64.sqrt() * self.sigma_m * (longest_s / EXCESS_SPAN_S).max(1.0)
     }
 
     /// Median over the arcs of the rms that the fit leaves, m.
@@ -179,6 +217,11 @@ impl Problem {
         let each: Vec<f64> = self.arcs.iter().zip(&level.fits).filter_map(|(arc, fit)| predicted_m(arc, fit)).collect();
         (!each.is_empty()).then(|| median(each))
     }
+}
+
+/// Which arcs have a velocity step in a level.
+fn kicks(level: &Level) -> Vec<bool> {
+    level.fits.iter().map(|fit| fit.impulse.is_some()).collect()
 }
 
 /// Rms of an arc's prediction beyond its fit, m.
@@ -209,6 +252,9 @@ fn rows_of(arc: &Arc, fit: &ArcFit, keep: impl Fn(Term) -> bool, wanted: Term) -
     let all = fit.partials.rows(0, rows);
     let active: usize = fit.coefficients.iter().map(|(term, _)| term.parameters().len()).sum();
     let mut base: Vec<usize> = (0..6).collect();
+    if fit.impulse.is_some() {
+        base.extend(fit.partials.ncols() - 4..fit.partials.ncols());
+    }
     base.extend((0..active).filter(|j| keep(fit.columns[*j].0)).map(|j| 6 + j));
     let of_wanted: Vec<usize> =
         fit.columns.iter().enumerate().filter(|(_, (term, _))| *term == wanted).map(|(j, _)| 6 + j).collect();
@@ -218,14 +264,39 @@ fn rows_of(arc: &Arc, fit: &ArcFit, keep: impl Fn(Term) -> bool, wanted: Term) -
         column /= norm;
     }
     let q = design.qr().q();
-    let residual = DVector::from_iterator(rows, fit.residuals_m[..arc.fitted].iter().flat_map(|r| [r.x, r.y, r.z]));
+    let residual = residual(arc, fit);
     let columns = all.select_columns(&of_wanted);
     let residual = &residual - &q * q.tr_mul(&residual);
     let columns = &columns - &q * q.tr_mul(&columns);
     Projected { residual, columns, unknowns: base.len() }
 }
 
-fn independent(residual: &DVector<f64>, unknowns: usize) -> f64 {
+/// Observed minus computed of the fitted epochs, one column.
+pub(super) fn residual(arc: &Arc, fit: &ArcFit) -> DVector<f64> {
+    DVector::from_iterator(3 * arc.fitted, fit.residuals_m[..arc.fitted].iter().flat_map(|r| [r.x, r.y, r.z]))
+}
+
+/// Covariance of the unknowns in some columns of a fit, the residuals' memory included.
+pub(super) fn covariance(problem: &Problem, arc: &Arc, fit: &ArcFit, used: &[usize]) -> Option<DMatrix<f64>> {
+    let design = fit.partials.rows(0, 3 * arc.fitted).select_columns(used);
+    let norms: Vec<f64> = design.column_iter().map(|c| c.norm().max(1e-300)).collect();
+    let scaled = DMatrix::from_fn(design.nrows(), design.ncols(), |i, j| design[(i, j)] / norms[j]);
+    let inverse = scaled.tr_mul(&scaled).try_inverse()?;
+    let left = residual(arc, fit);
+    let variance = variance(problem, &left, used.len() as f64);
+    Some(DMatrix::from_fn(used.len(), used.len(), |i, j| variance * inverse[(i, j)] / (norms[i] * norms[j])))
+}
+
+/// Variance of a residual coordinate times the memory of the series. The stated accuracy is a floor: residuals below it
+/// are luck, or a filter's smoothing.
+fn variance(problem: &Problem, left: &DVector<f64>, unknowns: f64) -> f64 {
+    let component = |axis: usize| left.iter().skip(axis).step_by(3).copied().collect::<Vec<f64>>();
+    let red = memory(&[component(0), component(1), component(2)]);
+    let floor = 0.25 * problem.sigma_m * problem.sigma_m;
+    (left.norm_squared() / (left.len() as f64 - unknowns).max(1.0)).max(floor) * red
+}
+
+pub(super) fn independent(residual: &DVector<f64>, unknowns: usize) -> f64 {
     let component = |axis: usize| residual.iter().skip(axis).step_by(3).copied().collect::<Vec<f64>>();
     let n = residual.len() as f64 / memory(&[component(0), component(1), component(2)]);
     n.max(unknowns as f64 + 6.0)
@@ -283,16 +354,11 @@ pub fn estimates(problem: &Problem, level: &Level, i: usize, term: Term) -> Vec<
         return Vec::new();
     };
     let left = &projected.residual - &projected.columns * &step;
-    let unknowns = (projected.unknowns + k) as f64;
-    let component = |axis: usize| left.iter().skip(axis).step_by(3).copied().collect::<Vec<f64>>();
-    let red = memory(&[component(0), component(1), component(2)]);
-    let rows = left.len() as f64;
-    // The stated accuracy is a floor: residuals below it are luck, or a filter's smoothing.
-    let variance = (left.norm_squared() / (rows - unknowns).max(1.0)).max(0.25 * problem.sigma_m * problem.sigma_m);
+    let variance = variance(problem, &left, (projected.unknowns + k) as f64);
     let systematic = if term.is_known_size() { UNLISTED_M_S2 / size_m_s2(problem, arc, term) } else { 0.0 };
     let one = |j: usize| Estimate {
         value: (start[j] + step[j]) * term.scale(),
-        sigma: ((variance * red * inverse[(j, j)]).max(0.0) * term.scale().powi(2) + systematic * systematic).sqrt(),
+        sigma: ((variance * inverse[(j, j)]).max(0.0) * term.scale().powi(2) + systematic * systematic).sqrt(),
     };
     (0..k).map(one).collect()
 }

@@ -13,6 +13,12 @@ use crate::physics::earth_orientation::{GpsInstant, TAI_MINUS_GPS_S, lagrange_we
 /// A position further than this from the polynomial through its neighbours is a blunder, m: polynomial and
 /// measurement together are good to decimetres at 15 minutes.
 const BLUNDER_M: f64 = 50.0;
+/// GPS time minus BeiDou time, s (exact).
+const GPS_MINUS_BDT_S: f64 = 14.0;
+/// What some makers write where there is no coordinate, km.
+const ABSENT_KM: f64 = 999_999.0;
+const GM_M3_S2: f64 = 3.986e14;
+const EARTH_RATE_RAD_S: f64 = 7.292e-5;
 
 /// One satellite's positions in the Earth-fixed frame.
 #[derive(Debug, Clone, Default)]
@@ -110,6 +116,7 @@ fn epoch(line: &str, scale: &str) -> Option<GpsInstant> {
     let instant = GpsInstant::from_calendar(year.parse().ok()?, month.parse().ok()?, day.parse().ok()?, s_of_day)?;
     match scale {
         "TAI" => Some(instant.plus_s(-TAI_MINUS_GPS_S)),
+        "BDT" => Some(instant.plus_s(GPS_MINUS_BDT_S)),
         "UTC" | "GLO" => Some(instant.plus_s(tai_minus_utc_s(instant.mjd).ok()? - TAI_MINUS_GPS_S)),
         _ => Some(instant),
     }
@@ -120,10 +127,17 @@ fn position(line: &str) -> Option<(String, Found)> {
     // Version a writes a bare number for a GPS satellite.
     let id =
         if id.starts_with(|c: char| c.is_ascii_alphabetic()) { id.replace(' ', "0") } else { format!("G{:0>2}", id) };
-    let km = |from: usize| line.get(from..from + 14)?.trim().parse::<f64>().ok();
-    let fixed_m = Vector3::new(km(4)?, km(18)?, km(32)?) * 1000.0;
+    // Columns are fixed; a maker who did not keep to them has blanks between his numbers.
+    let column = |from: usize| line.get(from..from + 14)?.trim().parse::<f64>().ok();
+    let word = |k: usize| line.get(4..)?.split_whitespace().nth(k)?.parse::<f64>().ok();
+    let [x, y, z] = match (column(4), column(18), column(32)) {
+        (Some(x), Some(y), Some(z)) => [x, y, z],
+        _ => [word(0)?, word(1)?, word(2)?],
+    };
+    let fixed_m = Vector3::new(x, y, z) * 1000.0;
     let flag = |column: usize| line.as_bytes().get(column).copied().unwrap_or(b' ');
-    let usable = fixed_m.iter().all(|x| x.is_finite()) && fixed_m.norm() > 6.0e6 && flag(79) != b'P';
+    let there = fixed_m.iter().all(|x| x.is_finite() && x.abs() < ABSENT_KM * 1000.0);
+    let usable = there && fixed_m.norm() > 6.0e6 && flag(79) != b'P';
     Some((id, Found { fixed_m, usable, manoeuvre: flag(78) == b'M' }))
 }
 
@@ -142,12 +156,18 @@ fn track(id: String, found: BTreeMap<i64, Found>, shift_s: f64) -> Track {
     track
 }
 
-/// Drop isolated positions that the eight neighbours contradict. In the Earth-fixed frame a 15-minute orbit is smooth
-/// enough for this; where the neighbours are uneven or far apart nothing is judged.
+/// Drop isolated positions that the eight neighbours contradict, where the orbit is smooth enough for their polynomial.
 fn drop_blunders(track: &mut Track) {
     let n = track.t_s.len();
     let miss = |i: usize| -> f64 {
-        if i < 4 || i + 4 >= n || track.t_s[i + 4] - track.t_s[i - 4] > 7_500.0 {
+        if i < 4 || i + 4 >= n {
+            return 0.0;
+        }
+        // What the polynomial itself misses at its middle: (w h)^8 r (4!)^2 / 8!, at the angular rate seen from the ground.
+        let radius = track.fixed_m[i].norm();
+        let rate = (GM_M3_S2 / radius.powi(3)).sqrt() + EARTH_RATE_RAD_S;
+        let spacing = (track.t_s[i + 4] - track.t_s[i - 4]) / 8.0;
+        if (rate * spacing).powi(8) * radius / 70.0 > 0.2 * BLUNDER_M {
             return 0.0;
         }
         let around: Vec<usize> = (i - 4..=i + 4).filter(|&j| j != i).collect();

@@ -12,7 +12,8 @@ use nalgebra::{DMatrix, DVector, Dyn, Owned, Vector3};
 use self::still::{Pose, find_poses};
 use crate::diagnose::answer::{Located, Verdict};
 use crate::diagnose::measured::answer::{ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, parameter, posterior};
-use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, texts};
+use crate::diagnose::measured::plates::PosesPlate;
+use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates, texts};
 
 /// Counts at zero acceleration, by the simulation.
 const ZERO_COUNTS: f64 = 32_768.0;
@@ -266,12 +267,17 @@ fn evidence(before: &Triad, after: &Triad, set: &[Part]) -> f64 {
 }
 
 /// Analyse a case of static poses.
-pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Answer, MeasuredError> {
+pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
     let gravity =
         case.number("recording.gravity_m_s2")?.ok_or_else(|| case.wrong("recording.gravity_m_s2", "a number"))?;
     let poses = poses(case, files)?;
     let found = search(&included(case)?, &poses, gravity);
-    Ok(answer(case, &poses, gravity, &found))
+    let added = std::iter::once("as it stands").chain(found.added.iter().map(|(part, _)| part.id()));
+    let plate = PosesPlate {
+        added: added.map(str::to_owned).collect(),
+        residuals: found.fits.iter().map(|fit| fit.residuals.clone()).collect(),
+    };
+    Ok((answer(case, &poses, gravity, &found), Plates::Poses(plate)))
 }
 
 /// The parts that the simulation has.

@@ -2,11 +2,19 @@
 
 use std::collections::BTreeMap;
 
+use crate::diagnose::measured::spread::{median, scatter};
 use crate::diagnose::measured::{MeasuredCase, MeasuredError, lookup};
 
 /// Block means are formed so that about so many remain: fine enough for hours, few enough for dense algebra.
 const BLOCKS: f64 = 600.0;
+/// With a reference beside it a series can be dated against it: blocks are then finer.
+const BLOCKS_WITH_REFERENCE: f64 = 3_000.0;
 const BLOCKS_MIN: usize = 40;
+/// A span of fewer blocks tells nothing beside its own constant, and is left out.
+const SPAN_BLOCKS_MIN: usize = 8;
+/// A row this many scatters from the median of its block is a blunder, in blocks of so many rows or more.
+const BLUNDER_SCATTERS: f64 = 12.0;
+const BLUNDER_ROWS_MIN: usize = 8;
 
 /// One measured axis or control.
 #[derive(Debug, Clone)]
@@ -19,8 +27,10 @@ pub struct Axis {
     pub unit: String,
     /// Whether nothing is expected in it.
     pub control: bool,
-    /// Block means.
+    /// Block means, less those of the reference where there is one.
     pub values: Vec<f64>,
+    /// Block means of what the simulation takes from another column.
+    pub reference: Option<Vec<f64>>,
 }
 
 /// One covariate.
@@ -54,14 +64,31 @@ pub struct Series {
     pub axes: Vec<Axis>,
     /// Covariates.
     pub covariates: Vec<CovariateSeries>,
-    /// Rows that could not be read.
+    /// Rows that could not be read, and blunders.
     pub masked: usize,
+}
+
+impl Series {
+    /// The usual time from one block to the next, s.
+    pub fn beat_s(&self) -> f64 {
+        median(self.t_s.windows(2).map(|w| w[1] - w[0])).max(1e-12)
+    }
+
+    /// Length of the shortest span, s.
+    pub fn shortest_span_s(&self) -> f64 {
+        let length = |k: usize| {
+            let inside = || self.t_s.iter().zip(&self.span).filter(move |(_, s)| **s == k).map(|(t, _)| *t);
+            inside().fold(f64::NEG_INFINITY, f64::max) - inside().fold(f64::INFINITY, f64::min)
+        };
+        (0..self.spans).map(length).filter(|l| *l > 0.0).fold(f64::INFINITY, f64::min)
+    }
 }
 
 struct Column {
     name: String,
     unit: String,
     axis: Option<String>,
+    reference: Option<String>,
 }
 
 /// Read the series of a case.
@@ -73,24 +100,43 @@ pub fn series(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<S
     }
     let controls = columns(case, "recording.controls")?;
     let covariates = columns(case, "recording.covariates")?;
-    let all: Vec<&Column> = values.iter().chain(&controls).chain(&covariates).collect();
+    let references: Vec<Column> = values.iter().filter_map(Column::its_reference).collect();
+    let all: Vec<&Column> = values.iter().chain(&controls).chain(&covariates).chain(&references).collect();
     let (t_s, table, masked) = rows(case, &file, &files[&file], &all)?;
     let spans = spans(case)?;
-    let (t_s, span, table) = blocks(&t_s, &table, &spans);
+    let count = if references.is_empty() { BLOCKS } else { BLOCKS_WITH_REFERENCE };
+    let Blocks { t_s, span, mut table, masked: blunders } = blocks(&t_s, &table, &spans, count);
     if t_s.len() < BLOCKS_MIN {
         return Err(MeasuredError::TooFew { what: "blocks of rows", found: t_s.len(), expected: BLOCKS_MIN });
     }
+    let mut references = table.split_off(all.len() - references.len()).into_iter();
     let mut table = table.into_iter();
     let mut axis = |column: Column, control: bool| {
+        let mut values = table.next().unwrap_or_default();
+        let reference = column.reference.as_ref().filter(|_| !control).and_then(|_| references.next());
+        if let Some(reference) = &reference {
+            values.iter_mut().zip(reference).for_each(|(v, r)| *v -= r);
+        }
         let name = column.axis.unwrap_or_else(|| column.name.clone());
-        Axis { column: column.name, name, unit: column.unit, control, values: table.next().unwrap_or_default() }
+        Axis { column: column.name, name, unit: column.unit, control, values, reference }
     };
     let mut axes: Vec<Axis> = values.into_iter().map(|c| axis(c, false)).collect();
     axes.extend(controls.into_iter().map(|c| axis(c, true)));
     let covariate =
         |c: Column| CovariateSeries { name: c.name, unit: c.unit, values: table.next().unwrap_or_default() };
     let covariates = covariates.into_iter().map(covariate).collect();
-    Ok(Series { t_s, span, spans: spans.len().max(1), axes, covariates, masked })
+    // Spans without a row in them have no constant to estimate.
+    let mut used: Vec<usize> = span.clone();
+    used.dedup();
+    let span: Vec<usize> = span.iter().map(|s| used.binary_search(s).unwrap_or(0)).collect();
+    Ok(Series { t_s, span, spans: used.len(), axes, covariates, masked: masked + blunders })
+}
+
+impl Column {
+    fn its_reference(&self) -> Option<Self> {
+        let name = self.reference.clone()?;
+        Some(Self { name, unit: self.unit.clone(), axis: None, reference: None })
+    }
 }
 
 fn columns(case: &MeasuredCase, key: &str) -> Result<Vec<Column>, MeasuredError> {
@@ -99,7 +145,8 @@ fn columns(case: &MeasuredCase, key: &str) -> Result<Vec<Column>, MeasuredError>
     let one = |entry: &toml::Value| {
         let text = |name: &str| entry.get(name).and_then(|v| v.as_str()).map(str::to_owned);
         let name = text("column").ok_or_else(wrong)?;
-        Ok(Column { name, unit: text("unit").unwrap_or_default(), axis: text("axis") })
+        let (axis, reference) = (text("axis"), text("reference"));
+        Ok(Column { name, unit: text("unit").unwrap_or_default(), axis, reference })
     };
     value.as_array().ok_or_else(wrong)?.iter().map(one).collect()
 }
@@ -112,6 +159,10 @@ fn spans(case: &MeasuredCase) -> Result<Vec<[f64; 2]>, MeasuredError> {
         list.try_into().ok()
     };
     let spans = value.as_array().and_then(|list| list.iter().map(pair).collect::<Option<Vec<_>>>());
+    let spans = spans.filter(|list| list.iter().all(|[from, to]| from < to)).map(|mut list| {
+        list.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        list
+    });
     spans.ok_or_else(|| case.wrong("recording.spans_h", "a list of [from, to] in hours"))
 }
 
@@ -162,7 +213,12 @@ fn rows(case: &MeasuredCase, file: &str, text: &str, wanted: &[&Column]) -> Resu
 
 fn seconds(text: &str, format: Option<&str>) -> Option<f64> {
     match format {
-        None => text.parse().ok(),
+        // Seconds, or a date in the usual form.
+        None => text.parse().ok().or_else(|| {
+            let instant = text.parse::<jiff::Timestamp>().ok();
+            let civil = || text.parse::<jiff::civil::DateTime>().ok()?.to_zoned(jiff::tz::TimeZone::UTC).ok();
+            Some(instant.or_else(|| Some(civil()?.timestamp()))?.as_millisecond() as f64 / 1000.0)
+        }),
         Some(format) => {
             let parsed = jiff::civil::DateTime::strptime(format, text).ok()?;
             Some(parsed.to_zoned(jiff::tz::TimeZone::UTC).ok()?.timestamp().as_millisecond() as f64 / 1000.0)
@@ -170,27 +226,57 @@ fn seconds(text: &str, format: Option<&str>) -> Option<f64> {
     }
 }
 
-/// Means over blocks of equal length, each inside one span.
-fn blocks(t_s: &[f64], table: &[Vec<f64>], spans: &[[f64; 2]]) -> (Vec<f64>, Vec<usize>, Vec<Vec<f64>>) {
+struct Blocks {
+    t_s: Vec<f64>,
+    span: Vec<usize>,
+    table: Vec<Vec<f64>>,
+    masked: usize,
+}
+
+/// Means over blocks of equal length, each inside one span, without the rows that the rest of their block contradicts.
+fn blocks(t_s: &[f64], table: &[Vec<f64>], spans: &[[f64; 2]], count: f64) -> Blocks {
     let span_of = |t: f64| match spans {
         [] => Some(0),
         _ => spans.iter().position(|[from, to]| (from * 3600.0..=to * 3600.0).contains(&t)),
     };
     let inside: Vec<(usize, usize)> = (0..t_s.len()).filter_map(|i| Some((i, span_of(t_s[i])?))).collect();
-    let length = inside.first().zip(inside.last()).map_or(1.0, |(a, b)| (t_s[b.0] - t_s[a.0]) / BLOCKS).max(1e-9);
-    let mut sums: BTreeMap<(usize, i64), (f64, Vec<f64>)> = BTreeMap::new();
-    for (i, span) in inside {
-        let key = (span, (t_s[i] / length).floor() as i64);
-        let (count, sum) = sums.entry(key).or_insert_with(|| (0.0, vec![0.0; table.len() + 1]));
-        *count += 1.0;
-        sum[0] += t_s[i];
-        sum[1..].iter_mut().zip(table).for_each(|(s, column)| *s += column[i]);
+    let times = || inside.iter().map(|(i, _)| t_s[*i]);
+    let (first, last) = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
+    let length = ((last - first) / count).max(1e-9);
+    let mut members: BTreeMap<(usize, i64), Vec<usize>> = BTreeMap::new();
+    for (i, span) in &inside {
+        members.entry((*span, (t_s[*i] / length).floor() as i64)).or_default().push(*i);
     }
-    let (mut times, mut span, mut out) = (Vec::new(), Vec::new(), vec![Vec::new(); table.len()]);
-    for ((which, _), (count, sum)) in sums {
-        times.push(sum[0] / count);
-        span.push(which);
-        out.iter_mut().zip(&sum[1..]).for_each(|(column, s)| column.push(s / count));
+    let mut out = Blocks { t_s: Vec::new(), span: Vec::new(), table: vec![Vec::new(); table.len()], masked: 0 };
+    let blocks_of = |span: usize| members.keys().filter(|(s, _)| *s == span).count();
+    let long: Vec<bool> = (0..spans.len().max(1)).map(|span| blocks_of(span) >= SPAN_BLOCKS_MIN).collect();
+    for ((span, _), rows) in members.into_iter().filter(|((span, _), _)| long[*span]) {
+        let kept = agreeing(&rows, table);
+        out.masked += rows.len() - kept.len();
+        let mean = |column: &[f64]| kept.iter().map(|i| column[*i]).sum::<f64>() / kept.len() as f64;
+        out.t_s.push(mean(t_s));
+        out.span.push(span);
+        out.table.iter_mut().zip(table).for_each(|(block, column)| block.push(mean(column)));
     }
-    (times, span, out)
+    out
+}
+
+/// The rows of a block without blunders: far from the median of any column, by its own scatter. Few rows, or a column that
+/// does not scatter, show none.
+fn agreeing(rows: &[usize], table: &[Vec<f64>]) -> Vec<usize> {
+    if rows.len() < BLUNDER_ROWS_MIN {
+        return rows.to_vec();
+    }
+    let limits: Vec<(f64, f64)> = table
+        .iter()
+        .map(|column| {
+            let values: Vec<f64> = rows.iter().map(|i| column[*i]).collect();
+            let width = scatter(&values);
+            (median(values), if width > 0.0 { BLUNDER_SCATTERS * width } else { f64::INFINITY })
+        })
+        .collect();
+    let agrees = |i: &&usize| table.iter().zip(&limits).all(|(column, (m, w))| (column[**i] - m).abs() <= *w);
+    let kept: Vec<usize> = rows.iter().filter(agrees).copied().collect();
+    // A block that falls apart is no block with blunders.
+    if 2 * kept.len() > rows.len() { kept } else { rows.to_vec() }
 }

@@ -1,0 +1,173 @@
+//! Forms with a memory: after the edges of the shadow, after logged events, after manoeuvres, with the time.
+
+use super::Collector;
+use crate::diagnose::measure::{coverage, decay};
+use crate::diagnose::scene::Scene;
+
+/// Instants at which a grid series crosses a level, with the sign of the crossing.
+pub(super) fn crossings(grid: &[f64], series: &[f64], level: f64) -> Vec<(f64, f64)> {
+    let mut out = Vec::new();
+    for i in 1..series.len() {
+        let (a, b) = (series[i - 1] - level, series[i] - level);
+        if a * b <= 0.0 && a != b {
+            out.push((grid[i - 1] + (grid[i] - grid[i - 1]) * a / (a - b), (b - a).signum()));
+        }
+    }
+    out
+}
+
+/// Sum of decays after instants, each forgetting the one before: exp(-(t - last)/tau).
+pub(super) fn since(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f64> {
+    let clock = scene.clock_s();
+    let mut sum = vec![0.0; clock.len()];
+    for (n, (instant, amplitude)) in instants.iter().enumerate() {
+        let next = instants.get(n + 1).map_or(f64::INFINITY, |(t, _)| *t);
+        let first = clock.partition_point(|t| t + 25.0 <= *instant);
+        let last = clock.partition_point(|t| t - 25.0 < next.min(instant + 12.0 * tau_s)).max(first);
+        let pulse = decay(&clock[first..last], *instant, tau_s);
+        // What the next one replaces: the same decay continued after it.
+        let gone = if next.is_finite() { decay(&clock[first..last], next, tau_s) } else { vec![0.0; last - first] };
+        let left = if next.is_finite() { (-(next - instant) / tau_s).exp() } else { 0.0 };
+        for ((total, p), g) in sum[first..last].iter_mut().zip(pulse).zip(gone) {
+            *total += amplitude * (p - left * g);
+        }
+    }
+    sum
+}
+
+pub(super) fn terminator(c: &mut Collector) {
+    let s = c.scene;
+    let all = crossings(&s.grid_s, &s.sunlit, 0.5);
+    let only = |sign: f64| all.iter().filter(|x| x.1 == sign).map(|x| (x.0, 1.0)).collect::<Vec<_>>();
+    let place = "after the edges of the shadow";
+    for tau in [60.0, 150.0, 300.0, 600.0, 1200.0, 2400.0] {
+        let both: Vec<(f64, f64)> = all.iter().map(|x| (x.0, 1.0)).collect();
+        for (what, list) in [
+            ("every terminator crossing", both),
+            ("every terminator crossing, signed", all.clone()),
+            ("sunrise", only(1.0)),
+            ("sunset", only(-1.0)),
+        ] {
+            c.windows(format!("exp(-(time since {what})/{tau:.0} s)"), "shadow", place, since(s, &list, tau));
+        }
+    }
+}
+
+pub(super) fn events(c: &mut Collector) {
+    let s = c.scene;
+    let mut kinds: Vec<&str> = s.case.events.iter().map(|e| e.kind.as_str()).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    for kind in kinds {
+        let spans = s.case.spans(kind);
+        let starts: Vec<(f64, f64)> = spans.iter().map(|x| (x[0], 1.0)).collect();
+        let ends: Vec<(f64, f64)> = spans.iter().map(|x| (x[1], 1.0)).collect();
+        for tau in [200.0, 600.0, 2000.0, 6000.0] {
+            c.windows(
+                format!("exp(-(time since start of {kind})/{tau:.0} s)"),
+                "time_since_event",
+                "after logged events",
+                since(s, &starts, tau),
+            );
+            c.windows(
+                format!("exp(-(time since end of {kind})/{tau:.0} s)"),
+                "time_since_event",
+                "after logged events",
+                since(s, &ends, tau),
+            );
+        }
+        for lag in [120.0, 300.0, 900.0, 2700.0] {
+            let late: Vec<[f64; 2]> = spans.iter().map(|x| [x[0] + lag, x[1] + lag]).collect();
+            c.windows(
+                format!("{kind}, {lag:.0} s late"),
+                "time_since_event",
+                "after logged events",
+                coverage(s.clock_s(), &late),
+            );
+        }
+        echoes(c, kind, &ends);
+        for (what, list) in [("start", &starts), ("end", &ends)] {
+            c.windows(
+                format!("time since {what} of {kind}"),
+                "time_since_event",
+                "between logged events",
+                ramp(s.clock_s(), list),
+            );
+        }
+        let count: Vec<f64> = s.clock_s().iter().map(|t| starts.iter().filter(|x| x.0 <= *t).count() as f64).collect();
+        c.windows(format!("number of {kind} so far"), "time_since_event", "after logged events", count);
+        if !matches!(kind, "water_dump" | "evaporator" | "thruster" | "crew_sleep") {
+            c.windows(
+                format!("{kind} lasts"),
+                "time_since_event",
+                "during logged events",
+                coverage(s.clock_s(), &spans),
+            );
+        }
+    }
+    let speed: Vec<f64> = s.wdot_rad_s2.iter().map(|w| w.norm()).collect();
+    let mut sorted = speed.clone();
+    sorted.sort_by(f64::total_cmp);
+    let level = 8.0 * sorted[sorted.len() / 2] + 1e-7;
+    let ends: Vec<(f64, f64)> =
+        crossings(&s.grid_s, &speed, level).into_iter().filter(|x| x.1 < 0.0).map(|x| (x.0, 1.0)).collect();
+    for tau in [300.0, 1000.0, 3000.0, 10_000.0] {
+        c.windows(
+            format!("exp(-(time since manoeuvre)/{tau:.0} s)"),
+            "time_since_manoeuvre",
+            "after manoeuvres",
+            since(s, &ends, tau),
+        );
+    }
+}
+
+/// A push some time after every entry of the log, that dies away.
+fn echoes(c: &mut Collector, kind: &str, ends: &[(f64, f64)]) {
+    let s = c.scene;
+    let mut members = Vec::new();
+    for delay in [300.0, 600.0, 900.0, 1300.0, 1800.0, 2400.0, 3000.0, 3600.0, 4500.0, 6000.0] {
+        for tau in [400.0, 1000.0, 2500.0] {
+            let late: Vec<(f64, f64)> = ends.iter().map(|x| (x.0 + delay, 1.0)).collect();
+            members.push((format!("exp(-(time since {delay:.0} s after {kind})/{tau:.0} s)"), since(s, &late, tau)));
+        }
+    }
+    c.family("time_since_event", "some time after logged events", members);
+}
+
+/// Time since the last of the instants, days; before the first as if one had been a day before it.
+fn ramp(clock_s: &[f64], instants: &[(f64, f64)]) -> Vec<f64> {
+    let first = instants.first().map_or(0.0, |x| x.0) - 86_400.0;
+    clock_s
+        .iter()
+        .map(|t| {
+            let last = instants.iter().map(|x| x.0).filter(|x| x <= t).fold(first, f64::max);
+            (t - last) / 86_400.0
+        })
+        .collect()
+}
+
+pub(super) fn clock(c: &mut Collector) {
+    let s = c.scene;
+    let [start, end] = s.span_s();
+    let t: Vec<f64> = s.clock_s().iter().map(|t| (t - start) / (end - start) * 2.0 - 1.0).collect();
+    c.windows("t^2", "time", "the whole record", t.iter().map(|x| x * x).collect());
+    c.windows("t^3", "time", "the whole record", t.iter().map(|x| x.powi(3)).collect());
+    for hours in [6.0, 8.0, 12.0, 24.0, 48.0] {
+        let rate = std::f64::consts::TAU / (hours * 3600.0);
+        c.several(
+            format!("sin, cos of a {hours:.0} h cycle"),
+            "time",
+            "a daily or shorter cycle",
+            &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()],
+        );
+    }
+    for cycles in (1..=40).map(|i| 0.05 * f64::from(i)).chain([2.5, 8.0, 12.0, 16.0]) {
+        let rate = std::f64::consts::TAU * cycles / s.period_s;
+        c.several(
+            format!("sin, cos at {cycles:.2} cycles per orbit"),
+            "per_orbit_line",
+            "a line of the spectrum",
+            &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()],
+        );
+    }
+}

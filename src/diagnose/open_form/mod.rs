@@ -1,0 +1,172 @@
+//! The unlisted competitor: formulas of covariates, events and memory that no catalogue entry claims.
+//!
+//! A dictionary of several hundred forms on the same evidence scale as the catalogue. Every form is dimensionless: centred and
+//! scaled to unit deviation over the record, so its coefficient is in ng. A form that wins is a hypothesis with a
+//! formula and a place, never a physical name.
+
+mod history;
+mod instrument;
+mod motion;
+mod places;
+mod surroundings;
+
+use crate::physics::Vec3;
+
+use super::catalogue::Shape;
+use super::design::Raw;
+use super::scene::{Axes, Scene};
+
+/// Prior size of the coefficient of a form, ng.
+pub const SIZE_NG: f64 = 30.0;
+
+/// A form at one value of what is free in it.
+pub struct Form {
+    /// The formula.
+    pub formula: String,
+    /// Its series.
+    pub shape: Shape,
+}
+
+/// A family of forms, weighed together: one form, or the same form at several widths, delays or places.
+pub struct Atom {
+    /// Covariate it belongs to.
+    pub covariate: &'static str,
+    /// Where it lives, in words.
+    pub location: &'static str,
+    /// Its forms.
+    pub forms: Vec<Form>,
+}
+
+struct Collector<'a> {
+    scene: &'a Scene<'a>,
+    atoms: Vec<Atom>,
+}
+
+impl Collector<'_> {
+    /// A number on the grid.
+    fn grid(
+        &mut self,
+        formula: impl Into<String>,
+        covariate: &'static str,
+        location: &'static str,
+        f: impl Fn(usize) -> f64,
+    ) {
+        let series = self.scene.measure_scalar(f);
+        self.windows(formula, covariate, location, series);
+    }
+
+    /// A series at the windows.
+    fn windows(
+        &mut self,
+        formula: impl Into<String>,
+        covariate: &'static str,
+        location: &'static str,
+        series: Vec<f64>,
+    ) {
+        self.family(covariate, location, [(formula.into(), series)]);
+    }
+
+    /// Several series at the windows, one of which may hold.
+    fn family(
+        &mut self,
+        covariate: &'static str,
+        location: &'static str,
+        members: impl IntoIterator<Item = (String, Vec<f64>)>,
+    ) {
+        let forms: Vec<Form> = members
+            .into_iter()
+            .filter_map(|(formula, series)| {
+                standard(&series).map(|series| Form { formula, shape: Shape::Scalar(series) })
+            })
+            .collect();
+        if !forms.is_empty() {
+            self.atoms.push(Atom { covariate, location, forms });
+        }
+    }
+
+    /// Columns, a coefficient each.
+    fn columns(
+        &mut self,
+        formula: impl Into<String>,
+        covariate: &'static str,
+        location: &'static str,
+        columns: Vec<Raw>,
+    ) {
+        let form = Form { formula: formula.into(), shape: Shape::Columns(columns) };
+        self.atoms.push(Atom { covariate, location, forms: vec![form] });
+    }
+
+    /// Several numbers on the grid, each with a coefficient on every body axis.
+    fn several(
+        &mut self,
+        formula: impl Into<String>,
+        covariate: &'static str,
+        location: &'static str,
+        parts: &[&dyn Fn(usize) -> f64],
+    ) {
+        let series: Vec<Vec<f64>> = parts.iter().filter_map(|f| standard(&self.scene.measure_scalar(f))).collect();
+        if series.len() == parts.len() {
+            let columns: Vec<Raw> = series
+                .iter()
+                .flat_map(|s| (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| s.clone()))))
+                .collect();
+            self.columns(formula, covariate, location, columns);
+        }
+    }
+
+    /// Vectors on the grid, one coefficient each, scaled to unit deviation over all axes.
+    fn vectors(
+        &mut self,
+        formula: impl Into<String>,
+        covariate: &'static str,
+        location: &'static str,
+        parts: &[&dyn Fn(usize) -> Vec3],
+    ) {
+        let columns: Vec<Raw> =
+            parts.iter().filter_map(|f| standard_vector(&self.scene.measure(f))).map(|axes| axes.map(Some)).collect();
+        if columns.len() == parts.len() {
+            self.columns(formula, covariate, location, columns);
+        }
+    }
+}
+
+/// Unit deviation, `None` for what hardly varies.
+fn standard(series: &[f64]) -> Option<Vec<f64>> {
+    let n = series.len() as f64;
+    let mean = series.iter().sum::<f64>() / n;
+    let deviation = (series.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
+    let largest = series.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let zero_at_rest = series.iter().filter(|x| **x == 0.0).count() * 2 > series.len();
+    // A form that is zero most of the time keeps its zeros: its support is where it lives.
+    let shift = if zero_at_rest { 0.0 } else { mean };
+    (deviation.is_finite() && deviation > 1e-9 * largest && deviation > 0.0)
+        .then(|| series.iter().map(|x| (x - shift) / deviation).collect())
+}
+
+fn standard_vector(axes: &Axes) -> Option<Axes> {
+    let n = axes[0].len() as f64;
+    let mean: [f64; 3] = std::array::from_fn(|k| axes[k].iter().sum::<f64>() / n);
+    let deviation =
+        ((0..3).map(|k| axes[k].iter().map(|x| (x - mean[k]).powi(2)).sum::<f64>()).sum::<f64>() / n).sqrt();
+    let largest = axes.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
+    (deviation.is_finite() && deviation > 1e-6 * largest && deviation > 0.0)
+        .then(|| std::array::from_fn(|k| axes[k].iter().map(|x| (x - mean[k]) / deviation).collect()))
+}
+
+/// The dictionary for a case.
+pub fn dictionary(scene: &Scene) -> Vec<Atom> {
+    let mut c = Collector { scene, atoms: Vec::new() };
+    motion::rates(&mut c);
+    motion::orbit(&mut c);
+    surroundings::sunlight(&mut c);
+    history::terminator(&mut c);
+    surroundings::field(&mut c);
+    surroundings::surroundings(&mut c);
+    instrument::sensor(&mut c);
+    history::events(&mut c);
+    history::clock(&mut c);
+    places::places(&mut c);
+    c.atoms
+}
+
+const AXIS: [&str; 3] = ["x", "y", "z"];

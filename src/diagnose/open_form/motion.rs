@@ -1,0 +1,97 @@
+//! Forms of the vehicle's motion: body rates, and phases of the orbit.
+
+use super::{AXIS, Collector};
+use crate::diagnose::scene::Scene;
+use crate::physics::Vec3;
+
+pub(super) fn rates(c: &mut Collector) {
+    let s = c.scene;
+    let place = "manoeuvres and deadband motion";
+    for i in 0..3 {
+        c.grid(format!("w{}", AXIS[i]), "body_rate", place, |g| s.w_rad_s[g][i]);
+        c.grid(format!("|w{}|", AXIS[i]), "body_rate", place, |g| s.w_rad_s[g][i].abs());
+        c.grid(format!("w{0} |w{0}|", AXIS[i]), "body_rate", place, |g| s.w_rad_s[g][i] * s.w_rad_s[g][i].abs());
+        c.grid(format!("dw{}/dt", AXIS[i]), "body_rate", place, |g| s.wdot_rad_s2[g][i]);
+        for j in i..3 {
+            c.grid(format!("w{} w{}", AXIS[i], AXIS[j]), "body_rate", place, |g| s.w_rad_s[g][i] * s.w_rad_s[g][j]);
+        }
+    }
+    for i in 0..3 {
+        let size: Vec<f64> = s.wdot_rad_s2.iter().map(|w| w[i].abs()).collect();
+        let mut sorted = size.clone();
+        sorted.sort_by(f64::total_cmp);
+        let caps = [0.5, 0.8, 0.9, 0.97, 1.0].map(|q| sorted[((sorted.len() - 1) as f64 * q) as usize]);
+        let members = caps.map(|cap| {
+            (format!("|dw{}/dt|, at most {cap:.1e} rad/s2", AXIS[i]), s.measure_scalar(|g| size[g].min(cap)))
+        });
+        c.family("body_rate", place, members);
+    }
+    c.grid("|w|", "body_rate", place, |g| s.w_rad_s[g].norm());
+    c.grid("w.w", "body_rate", place, |g| s.w_rad_s[g].norm_squared());
+}
+
+/// Angles of the orbit at every grid point: argument of latitude, and the angle past orbital noon.
+pub(super) fn angles(scene: &Scene) -> (Vec<f64>, Vec<f64>) {
+    (0..scene.grid_s.len())
+        .map(|g| {
+            let normal = scene.r_m[g].cross(&scene.v_m_s[g]).normalize();
+            let node = Vec3::new(-normal.y, normal.x, 0.0).normalize();
+            let u = scene.r_m[g].dot(&normal.cross(&node)).atan2(scene.r_m[g].dot(&node));
+            let noon = (scene.sun[g] - normal * normal.dot(&scene.sun[g])).normalize();
+            (u, scene.r_m[g].dot(&normal.cross(&noon)).atan2(scene.r_m[g].dot(&noon)))
+        })
+        .unzip()
+}
+
+pub(super) fn lvlh(scene: &Scene, g: usize) -> [Vec3; 3] {
+    let normal = scene.r_m[g].cross(&scene.v_m_s[g]).normalize();
+    let radial = scene.r_m[g].normalize();
+    [normal.cross(&radial), normal, radial]
+}
+
+pub(super) fn orbit(c: &mut Collector) {
+    let s = c.scene;
+    let (u, noon) = angles(s);
+    let bodies: [Vec<Vec3>; 3] =
+        std::array::from_fn(|k| (0..s.grid_s.len()).map(|g| s.body[g] * lvlh(s, g)[k]).collect());
+    let place = "a phase of the orbit";
+    for k in 1..=6 {
+        let n = k as f64;
+        c.several(
+            format!("sin {k}u, cos {k}u"),
+            "argument_of_latitude",
+            place,
+            &[&|g| (n * u[g]).sin(), &|g| (n * u[g]).cos()],
+        );
+        c.several(
+            format!("sin {k}(u - u_noon), cos {k}(u - u_noon)"),
+            "sun_phase",
+            place,
+            &[&|g| (n * noon[g]).sin(), &|g| (n * noon[g]).cos()],
+        );
+        if k <= 3 {
+            for (name, b) in ["along-track", "cross-track", "radial"].into_iter().zip(&bodies) {
+                c.vectors(
+                    format!("sin {k}u, cos {k}u {name}"),
+                    "argument_of_latitude",
+                    place,
+                    &[&|g| b[g] * (n * u[g]).sin(), &|g| b[g] * (n * u[g]).cos()],
+                );
+                c.vectors(
+                    format!("sin {k}(u - u_noon), cos {k}(u - u_noon) {name}"),
+                    "sun_phase",
+                    place,
+                    &[&|g| b[g] * (n * noon[g]).sin(), &|g| b[g] * (n * noon[g]).cos()],
+                );
+            }
+        }
+    }
+    c.vectors(
+        "a constant in the local vertical frame",
+        "attitude",
+        "changes of attitude",
+        &[&|g| bodies[0][g], &|g| bodies[1][g], &|g| bodies[2][g]],
+    );
+    let fixed = |k: usize| move |g: usize| s.body[g].column(k).into_owned();
+    c.vectors("a constant in inertial axes", "attitude", "changes of attitude", &[&fixed(0), &fixed(1), &fixed(2)]);
+}

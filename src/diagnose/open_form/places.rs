@@ -1,0 +1,105 @@
+//! Forms that live in one place: within a bump or beyond a threshold of any covariate, and over one region of the Earth.
+
+use super::{AXIS, Collector};
+use crate::physics::{sun, time};
+
+/// Centres of the bumps round a circle.
+const CENTRES: usize = 16;
+/// Widths of the bumps, standard deviation, deg.
+const WIDTHS_DEG: [f64; 3] = [10.0, 20.0, 40.0];
+/// Shares of the record beyond the thresholds.
+const QUANTILES: [f64; 9] = [0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95];
+
+pub(super) fn places(c: &mut Collector) {
+    circles(c);
+    regions(c);
+    thresholds(c);
+}
+
+fn right_ascension_rad(c: &Collector) -> Vec<f64> {
+    c.scene.r_m.iter().map(|r| r.y.atan2(r.x)).collect()
+}
+
+/// A bump at one phase of the orbit, at one angle from orbital noon, at one local time.
+fn circles(c: &mut Collector) {
+    let s = c.scene;
+    let (u, noon) = super::motion::angles(s);
+    let sun_ra = sun::right_ascension_rad(s.case.header.unix_s(s.grid_s[0]));
+    let local: Vec<f64> = right_ascension_rad(c).iter().map(|a| a - sun_ra).collect();
+    for (name, covariate, angle) in [
+        ("u", "argument_of_latitude", &u),
+        ("u - u_noon", "sun_phase", &noon),
+        ("local time - 12 h", "local_time", &local),
+    ] {
+        let members: Vec<(String, Vec<f64>)> = WIDTHS_DEG
+            .iter()
+            .flat_map(|width| (0..CENTRES).map(move |i| (*width, 360.0 * i as f64 / CENTRES as f64)))
+            .map(|(width, centre)| {
+                // Von Mises: a bump on a circle.
+                let narrow = width.to_radians().powi(-2);
+                let series = s.measure_scalar(|g| (narrow * ((angle[g] - centre.to_radians()).cos() - 1.0)).exp());
+                (format!("a bump of {width:.0} deg at {name} = {centre:.0} deg"), series)
+            })
+            .collect();
+        c.family(covariate, "one part of a circle", members);
+    }
+}
+
+/// A push over one region of the Earth.
+fn regions(c: &mut Collector) {
+    let s = c.scene;
+    let longitude: Vec<f64> = right_ascension_rad(c)
+        .iter()
+        .zip(&s.grid_s)
+        .map(|(a, t)| a - time::gmst_rad(s.case.header.unix_s(*t)))
+        .collect();
+    let north: Vec<bool> = s.r_m.iter().map(|r| r.z > 0.0).collect();
+    let mut members = Vec::new();
+    for (half, wanted) in [("", None), (" of the northern half", Some(true)), (" of the southern half", Some(false))] {
+        for width in [15.0_f64, 30.0, 50.0] {
+            for i in 0..18 {
+                let centre = 20.0 * f64::from(i);
+                let inside = |g: usize| {
+                    let away = (longitude[g].to_degrees() - centre + 540.0).rem_euclid(360.0) - 180.0;
+                    f64::from(u8::from(away.abs() < width && wanted.is_none_or(|n| n == north[g])))
+                };
+                let formula = format!("within {width:.0} deg of longitude {centre:.0} deg{half}");
+                members.push((formula, s.measure_scalar(inside)));
+            }
+        }
+    }
+    c.family("longitude", "over one region of the Earth", members);
+}
+
+/// Beyond a threshold of one covariate: a gate, and a ramp that starts there.
+fn thresholds(c: &mut Collector) {
+    let s = c.scene;
+    let grid = |f: &dyn Fn(usize) -> f64| s.measure_scalar(f);
+    let mut covariates: Vec<(String, &'static str, Vec<f64>)> = vec![
+        ("h".into(), "altitude", grid(&|g| s.r_m[g].norm())),
+        ("rho".into(), "density", grid(&|g| s.case.ancillary.density_kg_m3[g])),
+        ("T".into(), "temperature", grid(&|g| s.temperature_c[g])),
+        ("|B|".into(), "geomagnetic_field", grid(&|g| s.field_body_t[g].norm())),
+        ("latitude".into(), "latitude", grid(&|g| s.r_m[g].z / s.r_m[g].norm())),
+        ("cos(Sun zenith angle)".into(), "sun_angle", grid(&|g| s.sun[g].dot(&s.r_m[g].normalize()))),
+        ("|dw/dt|".into(), "body_rate", grid(&|g| s.wdot_rad_s2[g].norm())),
+    ];
+    for k in 0..3 {
+        covariates.push((format!("m{}", AXIS[k]), "modelled_signal", s.simulated_ng[k].clone()));
+    }
+    for (name, covariate, series) in covariates {
+        let mut sorted = series.clone();
+        sorted.sort_by(f64::total_cmp);
+        let mut members = Vec::new();
+        for q in QUANTILES {
+            let level = sorted[((sorted.len() - 1) as f64 * (1.0 - q)) as usize];
+            let share = format!("{name} beyond what {:.0} % of the windows have", 100.0 * (1.0 - q));
+            members.push((share.clone(), series.iter().map(|x| f64::from(u8::from(*x > level))).collect()));
+            if covariate == "modelled_signal" {
+                members.push((format!("excess of {share}"), series.iter().map(|x| (x - level).max(0.0)).collect()));
+                members.push((format!("shortfall of {share}"), series.iter().map(|x| (level - x).max(0.0)).collect()));
+            }
+        }
+        c.family(covariate, "beyond a threshold", members);
+    }
+}

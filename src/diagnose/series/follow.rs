@@ -1,0 +1,165 @@
+//! What a sensor's series may follow beside its simulation, each as a column of the regression. Not here: which of them it
+//! follows (see `search`).
+
+use super::read::{Axis, Series};
+
+/// An effect a sensor's series may show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Follows {
+    /// A temperature (index of the covariate), late by a time constant in seconds.
+    Temperature(usize, f64),
+    /// Exponential decay with this time constant in seconds from the start of the data.
+    Drift(f64),
+    /// A step at this time, s.
+    Step(f64),
+    /// The reference, more or less of it than the simulation has.
+    Scale,
+    /// The reference, by so many seconds earlier than the series' own clock says.
+    Offset(f64),
+}
+
+impl Follows {
+    /// The catalogue's name.
+    pub fn id(&self) -> &'static str {
+        match self {
+            Self::Temperature(..) => "temperature_bias",
+            Self::Drift(_) => "bias_drift",
+            Self::Step(_) => "bias_step",
+            Self::Scale => "scale_factor",
+            Self::Offset(_) => "time_offset",
+        }
+    }
+
+    /// The name for people.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Temperature(..) => "Bias follows temperature",
+            Self::Drift(_) => "Bias decays",
+            Self::Step(_) => "Bias steps",
+            Self::Scale => "Scale factor against the reference",
+            Self::Offset(_) => "Clock runs ahead of the reference's",
+        }
+    }
+
+    /// How many unknowns it is charged for: its coefficient, and what was looked for beside it.
+    pub fn price(&self) -> f64 {
+        if matches!(self, Self::Temperature(_, 0.0) | Self::Scale) { 1.0 } else { 2.0 }
+    }
+
+    /// The number that does not enter linearly: a time constant or an instant.
+    pub fn inner(&self) -> Option<f64> {
+        match *self {
+            Self::Temperature(_, s) | Self::Drift(s) | Self::Step(s) | Self::Offset(s) => Some(s),
+            Self::Scale => None,
+        }
+    }
+
+    /// The same effect with another such number.
+    pub fn with_inner(self, s: f64) -> Self {
+        match self {
+            Self::Temperature(k, _) => Self::Temperature(k, s),
+            Self::Drift(_) => Self::Drift(s),
+            Self::Step(_) => Self::Step(s),
+            Self::Offset(_) => Self::Offset(s),
+            Self::Scale => Self::Scale,
+        }
+    }
+}
+
+/// One axis to be explained: its values less what is known of them, and the columns of a model.
+pub struct Equation {
+    /// Recording less simulation, less what the model fixes without a coefficient.
+    pub values: Vec<f64>,
+    /// One column per effect.
+    pub columns: Vec<Vec<f64>>,
+}
+
+/// Put a model to an axis.
+pub fn equation(series: &Series, axis: &Axis, model: &[Follows]) -> Equation {
+    let t = &series.t_s;
+    let offset_s = model.iter().find_map(|f| if let Follows::Offset(s) = f { Some(*s) } else { None });
+    let mut values = axis.values.clone();
+    // The simulation is the reference as it stands; the model's is the reference at a shifted time.
+    let reference = axis.reference.as_ref().map(|r| match offset_s {
+        None => r.clone(),
+        Some(s) => {
+            let moved: Vec<f64> = t.iter().map(|t| at(&series.t_s, r, t - s)).collect();
+            values.iter_mut().zip(r.iter().zip(&moved)).for_each(|(v, (was, is))| *v -= is - was);
+            moved
+        }
+    });
+    let none = || vec![0.0; t.len()];
+    let column = |follows: &Follows| match follows {
+        Follows::Temperature(k, lag_s) => late(t, &series.covariates[*k].values, *lag_s),
+        Follows::Drift(tau_s) => t.iter().map(|t| (-(t - series.t_s[0]) / tau_s).exp()).collect(),
+        Follows::Step(at_s) => t.iter().map(|t| f64::from(u8::from(t >= at_s))).collect(),
+        Follows::Scale => reference.clone().unwrap_or_else(none),
+        Follows::Offset(_) => reference.as_ref().map_or_else(none, |r| slope(t, r).iter().map(|s| -s).collect()),
+    };
+    Equation { columns: model.iter().map(column).collect(), values }
+}
+
+/// First-order lag; a gap restarts it at what is measured then.
+fn late(t_s: &[f64], x: &[f64], lag_s: f64) -> Vec<f64> {
+    if lag_s <= 0.0 {
+        return x.to_vec();
+    }
+    let mut out = Vec::with_capacity(x.len());
+    let mut state = x.first().copied().unwrap_or(0.0);
+    for (i, value) in x.iter().enumerate() {
+        if i > 0 {
+            let dt = t_s[i] - t_s[i - 1];
+            // Between two means the input goes straight from one to the other.
+            let (decay, before) = ((-dt / lag_s).exp(), x[i - 1]);
+            let ramp = 1.0 - (1.0 - decay) * lag_s / dt;
+            let driven = value * ramp + before * (1.0 - decay - ramp);
+            state = if dt > 4.0 * lag_s { *value } else { state * decay + driven };
+        }
+        out.push(state);
+    }
+    out
+}
+
+/// Value at a time between the samples, by the cubic through the four nearest; the ends hold.
+fn at(t_s: &[f64], x: &[f64], when: f64) -> f64 {
+    let n = t_s.len();
+    let after = t_s.partition_point(|t| *t <= when);
+    if after == 0 || n < 4 {
+        return x[0];
+    }
+    if after >= n {
+        return x[n - 1];
+    }
+    let from = after.saturating_sub(2).min(n - 4);
+    let nodes: Vec<f64> = t_s[from..from + 4].iter().map(|t| t - t_s[from]).collect();
+    let weights = crate::physics::earth_orientation::lagrange_weights(&nodes, when - t_s[from]);
+    weights.iter().zip(&x[from..from + 4]).map(|(w, x)| w * x).sum()
+}
+
+fn slope(t_s: &[f64], x: &[f64]) -> Vec<f64> {
+    let n = t_s.len();
+    let one = |i: usize| {
+        let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));
+        (x[b] - x[a]) / (t_s[b] - t_s[a]).max(1e-12)
+    };
+    (0..n).map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_late_response_to_a_ramp_trails_it_by_its_time_constant() {
+        let t: Vec<f64> = (0..400).map(|i| 10.0 * f64::from(i)).collect();
+        let trailing = late(&t, &t, 200.0);
+        assert!((t[399] - trailing[399] - 200.0).abs() < 1e-6, "{}", t[399] - trailing[399]);
+    }
+
+    #[test]
+    fn between_samples_a_sine_is_read_to_a_thousandth() {
+        let t: Vec<f64> = (0..100).map(f64::from).collect();
+        let x: Vec<f64> = t.iter().map(|t| (t / 5.0).sin()).collect();
+        assert!((at(&t, &x, 40.37) - (40.37_f64 / 5.0).sin()).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,271 @@
+//! What a series was found to follow, in words and figures: one entry an axis, and all axes together. Not here: how it was
+//! found (`search`).
+
+use super::follow::Follows;
+use super::read::{Axis, Series};
+use super::search::{AxisFound, held_out, regress};
+use crate::diagnose::answer::{Covariate, Interval, Located, ParameterAnswer, Verdict};
+use crate::diagnose::measured::answer::{ArcAnswer, Effect, Fit, HeldOut, Level, Limit, parameter, posterior};
+use crate::diagnose::measured::spread::median;
+use crate::diagnose::measured::{Answer, MeasuredCase};
+
+/// What stays is worth saying when it is this many times the scatter from one block to the next.
+const LEFT_FACTOR: f64 = 3.0;
+
+/// The answer for all axes.
+pub fn answer(case: &MeasuredCase, series: &Series, found: &[AxisFound]) -> Answer {
+    let rows: Vec<Row<'_>> = series.axes.iter().zip(found).map(|(axis, found)| Row { series, axis, found }).collect();
+    let arcs: Vec<ArcAnswer> = rows.iter().map(Row::arc).collect();
+    let measured: Vec<&Row<'_>> = rows.iter().filter(|row| !row.axis.control).collect();
+    let effects = common_effects(&rows, &arcs);
+    let is = |v: Verdict| arcs.iter().zip(&rows).any(|(arc, row)| !row.axis.control && arc.verdict == v);
+    let verdict = match (effects.is_empty(), is(Verdict::Unexplained)) {
+        (false, _) => Verdict::Explained,
+        (true, true) => Verdict::Unexplained,
+        (true, false) => Verdict::Consistent,
+    };
+    let weakest = measured.iter().flat_map(|row| row.found.effects.iter().map(|e| e.1)).fold(f64::INFINITY, f64::min);
+    let refused = measured.iter().map(|row| row.found.refused).fold(0.0, f64::max);
+    let score = if weakest.is_finite() { weakest } else { refused };
+    let notes = arcs.iter().filter_map(|arc| arc.note.as_ref().map(|note| format!("{}: {note}", arc.id)));
+    Answer {
+        schema: "oare.diagnosis/1".to_owned(),
+        case: case.id.clone(),
+        verdict,
+        false_alarm_probability: (-0.5 * score).exp().clamp(1e-12, 1.0),
+        located: located(&measured),
+        alternatives: Vec::new(),
+        hypothesis: None,
+        unit: measured.first().map_or(String::new(), |row| row.axis.unit.clone()),
+        fit: fit(&measured),
+        upper_limits: rows.iter().filter_map(Row::limit).collect(),
+        separating_observation: None,
+        cannot_tell_apart: Vec::new(),
+        steps: Vec::new(),
+        notes: notes.collect(),
+        effects,
+        arcs,
+    }
+}
+
+/// One axis with what was found in it.
+struct Row<'a> {
+    series: &'a Series,
+    axis: &'a Axis,
+    found: &'a AxisFound,
+}
+
+impl Row<'_> {
+    fn effects(&self) -> Vec<Effect> {
+        let one = |(i, (follows, score)): (usize, &(Follows, f64))| {
+            let (was, is) = (self.found.fits[i].rms(), self.found.fits[i + 1].rms());
+            let with = match follows {
+                Follows::Temperature(k, _) => format!(" Covariate: {}.", self.series.covariates[*k].name),
+                _ => String::new(),
+            };
+            let r2 = 1.0 - (is / was).powi(2);
+            let why = format!("{was:.3e} to {is:.3e} {} rms of block means (R2 {r2:.2}).{with}", self.axis.unit);
+            let (id, name) = (follows.id().to_owned(), follows.name().to_owned());
+            let axis = matches!(follows, Follows::Scale).then(|| self.axis.name.clone());
+            let parameters = self.parameters(i, *follows);
+            Effect { id, name, posterior: posterior(*score), parameters, axis, from_degree: None, why, rms: vec![is] }
+        };
+        self.found.effects.iter().enumerate().map(one).collect()
+    }
+
+    fn parameters(&self, i: usize, follows: Follows) -> Vec<ParameterAnswer> {
+        let (value, sigma) = self.found.last().coefficients[self.found.included.len() + i];
+        let (unit, name, inner) = (&self.axis.unit, &self.axis.name, self.found.inner_sigma[i]);
+        // The catalogue's own names carry the unit they are fixed to.
+        let ng = if unit == "ng" { "_ng" } else { "" };
+        match follows {
+            Follows::Temperature(k, lag_s) => {
+                let per = &self.series.covariates[k].unit;
+                let named = if unit == "ng" && per == "C" { "_ng_per_c" } else { "" };
+                vec![
+                    parameter(&format!("slope_{name}{named}"), value, sigma, &format!("{unit}/{per}")),
+                    parameter("lag_s", lag_s, inner, "s"),
+                ]
+            }
+            Follows::Drift(tau_s) => {
+                vec![parameter("tau_s", tau_s, inner, "s"), parameter(&format!("a{name}{ng}"), value, sigma, unit)]
+            }
+            Follows::Step(at_s) => {
+                vec![parameter("onset_s", at_s, inner, "s"), parameter(&format!("a{name}{ng}"), value, sigma, unit)]
+            }
+            Follows::Scale => vec![parameter("fraction", value, sigma, "1")],
+            Follows::Offset(_) => vec![parameter("offset_s", value, sigma, "s")],
+        }
+    }
+
+    fn arc(&self) -> ArcAnswer {
+        let (first, last) = (&self.found.fits[0], self.found.last());
+        let effects = self.effects();
+        let left = last.rms() / short_term(&last.residuals).max(1e-300);
+        let slow = left > LEFT_FACTOR && !self.axis.control;
+        let note = slow.then(|| {
+            let removed = 100.0 * (1.0 - (last.rms() / first.rms()).powi(2));
+            format!(
+                "{:.3e} {} rms stays, {left:.0} times the scatter from block to block ({removed:.0} % of the variance is explained): something slow is left, and nothing in the catalogue accounts for it.",
+                last.rms(),
+                self.axis.unit,
+            )
+        });
+        let verdict = match (effects.is_empty(), slow) {
+            (false, _) => Verdict::Explained,
+            (true, true) => Verdict::Unexplained,
+            (true, false) => Verdict::Consistent,
+        };
+        ArcAnswer {
+            id: self.axis.column.clone(),
+            verdict,
+            effects,
+            fitted_beside: Vec::new(),
+            rms_before: first.rms(),
+            rms_after: last.rms(),
+            predicted_rms: Some(held_out(self.series, self.axis, &self.found.model())),
+            fitted: self.series.t_s.len(),
+            masked: self.series.masked,
+            note,
+        }
+    }
+
+    /// How large a slope could hide, where none is claimed.
+    fn limit(&self) -> Option<Limit> {
+        let covariate = (0..self.series.covariates.len()).find(|k| self.series.covariates[*k].is_temperature())?;
+        if !self.found.effects.is_empty() {
+            return None;
+        }
+        let mut model = self.found.included.clone();
+        model.push(Follows::Temperature(covariate, 0.0));
+        let (value, sigma) = regress(self.series, self.axis, &model).coefficients[self.found.included.len()];
+        let unit = format!("{}/{} on {}", self.axis.unit, self.series.covariates[covariate].unit, self.axis.column);
+        Some(Limit { id: "temperature_bias".to_owned(), limit: value.abs() + 2.0 * sigma, unit })
+    }
+}
+
+/// The axes' effects under one name each: what belongs to an axis keeps its own parameter, what they share becomes one.
+fn common_effects(rows: &[Row<'_>], arcs: &[ArcAnswer]) -> Vec<Effect> {
+    let mut ids: Vec<&str> = Vec::new();
+    let measured = || rows.iter().zip(arcs).filter(|(row, _)| !row.axis.control);
+    for (_, arc) in measured() {
+        ids.extend(arc.effects.iter().map(|e| e.id.as_str()));
+    }
+    let mut seen: Vec<&str> = Vec::new();
+    ids.retain(|id| {
+        !seen.contains(id) && {
+            seen.push(id);
+            true
+        }
+    });
+    let merged = |id: &str| {
+        let own: Vec<(&Row<'_>, &Effect)> =
+            measured().filter_map(|(row, arc)| Some((row, arc.effects.iter().find(|e| e.id == id)?))).collect();
+        let (_, model) = own.first()?;
+        let mut parameters: Vec<ParameterAnswer> = Vec::new();
+        let mut shared: Vec<ParameterAnswer> = Vec::new();
+        let names: Vec<&String> = model.parameters.iter().map(|p| &p.name).collect();
+        for (row, effect) in &own {
+            for p in &effect.parameters {
+                let of_all = matches!(p.name.as_str(), "lag_s" | "tau_s" | "onset_s" | "offset_s");
+                match (of_all, p.name == "fraction" && own.len() > 1) {
+                    (true, _) => shared.push(p.clone()),
+                    (_, true) => {
+                        parameters.push(ParameterAnswer { name: format!("fraction_{}", row.axis.name), ..p.clone() })
+                    }
+                    _ => parameters.push(p.clone()),
+                }
+            }
+        }
+        if let Some(name) = names.into_iter().find(|n| shared.iter().any(|s| s.name == **n)) {
+            parameters.push(joined(name, &shared));
+            let apart = |s: &&ParameterAnswer| s.value != shared[0].value;
+            if shared.iter().any(|s| apart(&s)) {
+                let per_axis = own.iter().zip(&shared).map(|((row, _), s)| ParameterAnswer {
+                    name: name.replace("_s", &format!("_{}_s", row.axis.name)),
+                    ..s.clone()
+                });
+                parameters.extend(per_axis);
+            }
+        }
+        let why: Vec<String> = own.iter().map(|(row, e)| format!("{}: {}", row.axis.column, e.why)).collect();
+        Some(Effect {
+            posterior: own.iter().map(|(_, e)| e.posterior).fold(0.0, f64::max),
+            parameters,
+            axis: if own.len() == 1 { model.axis.clone() } else { None },
+            why: why.join(" "),
+            rms: own.iter().flat_map(|(_, e)| e.rms.clone()).collect(),
+            ..(*model).clone()
+        })
+    };
+    ids.into_iter().filter_map(merged).collect()
+}
+
+/// One number for all axes: the weighted mean, with the axes' own disagreement in its error.
+fn joined(name: &str, each: &[ParameterAnswer]) -> ParameterAnswer {
+    let weight = |p: &ParameterAnswer| p.sigma.max(1e-9).powi(-2);
+    let total: f64 = each.iter().map(weight).sum();
+    let mean = each.iter().map(|p| p.value * weight(p)).sum::<f64>() / total;
+    let chi2 = each.iter().map(|p| (p.value - mean).powi(2) * weight(p)).sum::<f64>();
+    let excess = (chi2 / (each.len() as f64 - 1.0).max(1.0)).max(1.0);
+    parameter(name, mean, (excess / total).sqrt(), &each[0].unit)
+}
+
+fn fit(measured: &[&Row<'_>]) -> Fit {
+    let level = |rms: Vec<f64>| {
+        let chi2 = rms.iter().zip(measured).map(|(rms, row)| (rms / row.floor()).powi(2));
+        Level { rms_total: rms.iter().map(|r| r * r).sum::<f64>().sqrt(), whitened_chi2_per_dof: median(chi2), rms }
+    };
+    let power = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
+    let before_rms: Vec<f64> = measured.iter().map(|row| held_out(row.series, row.axis, &row.found.included)).collect();
+    let after_rms: Vec<f64> = measured.iter().map(|row| held_out(row.series, row.axis, &row.found.model())).collect();
+    let held = HeldOut {
+        scheme: "blocks of six hours (or an eighth of what is shorter), every other one left out in turn".to_owned(),
+        excess_removed: 1.0 - power(&after_rms) / power(&before_rms).max(1e-300),
+        before_rms,
+        after_rms,
+    };
+    Fit {
+        noise_floor: measured.iter().map(|row| row.floor()).collect(),
+        before: level(measured.iter().map(|row| row.found.fits[0].rms()).collect()),
+        after: level(measured.iter().map(|row| row.found.last().rms()).collect()),
+        held_out: Some(held),
+    }
+}
+
+impl Row<'_> {
+    fn floor(&self) -> f64 {
+        short_term(&self.found.last().residuals).max(1e-300)
+    }
+}
+
+fn located(measured: &[&Row<'_>]) -> Located {
+    let covariates = measured.iter().flat_map(|row| {
+        let follows = |f: &Follows| match f {
+            Follows::Temperature(k, _) => row.series.covariates[*k].name.clone(),
+            other => other.id().to_owned(),
+        };
+        let one = move |(f, score): &(Follows, f64)| Covariate {
+            name: format!("{}: {}", row.axis.column, follows(f)),
+            score: *score,
+        };
+        row.found.effects.iter().map(one).collect::<Vec<_>>()
+    });
+    let onset = |row: &&&Row<'_>| {
+        let at = row.found.effects.iter().find_map(|(f, _)| if let Follows::Step(s) = f { Some(*s) } else { None })?;
+        let end_s = row.series.t_s.last().copied()?;
+        Some(Interval { start_s: at, end_s, why: format!("{}: onset", row.axis.column) })
+    };
+    Located {
+        axes: measured.iter().filter(|row| !row.found.effects.is_empty()).map(|row| row.axis.name.clone()).collect(),
+        frame: "sensor".to_owned(),
+        covariates: covariates.collect(),
+        intervals: measured.iter().filter_map(|row| onset(&row)).collect(),
+        ..Located::default()
+    }
+}
+
+/// Scatter from one block to the next, free of everything slow.
+fn short_term(values: &[f64]) -> f64 {
+    1.4826 * median(values.windows(2).map(|w| (w[1] - w[0]).abs())) / 2f64.sqrt()
+}

@@ -1,0 +1,370 @@
+//! Which effects an axis follows: a forward search on the likelihood in red noise, each step checked on blocks that its fit
+//! has not seen. Not here: what is said of it (see the room's own file).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::follow::{Equation, Follows, equation};
+use super::read::{Axis, Series};
+use super::red::{self, Beat};
+use crate::diagnose::measured::{MeasuredCase, MeasuredError};
+
+/// Evidence needed to claim an effect, over red noise. A second gate follows: it must predict blocks that the fit has not
+/// seen. Of 1,000 series of red noise of any memory none passes both (`series::tests`); rarer false alarms are not shown.
+const SCORE_MIN: f64 = 18.0;
+/// A late response must beat the immediate one by this much: its time constant was looked for.
+const LATE_MARGIN: f64 = 18.0;
+/// Time constants tried for a late response, as parts of the span, beside none at all.
+const LAGS: [f64; 8] = [0.0015, 0.003, 0.006, 0.0125, 0.025, 0.05, 0.1, 0.2];
+const DRIFTS: [f64; 4] = [0.05, 0.15, 0.5, 5.0];
+/// The likeliest instants of a step that are weighed in full.
+const STEPS: usize = 3;
+/// Offsets tried against a reference, in samples, either way.
+const OFFSETS: [f64; 11] = [0.0, 1.0, 2.0, 4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0];
+/// Held-out prediction leaves out blocks of this length in turn, s, or of an eighth of the shortest span.
+const HELD_OUT_S: f64 = 6.0 * 3600.0;
+const EFFECTS_MAX: usize = 4;
+const GOLDEN: f64 = 0.618_033_988_749_895;
+
+/// Least squares of one axis on a constant per span and some effects.
+#[derive(Debug, Clone)]
+pub struct Regression {
+    /// Coefficient and standard error of each effect, in order.
+    pub coefficients: Vec<(f64, f64)>,
+    /// What stays.
+    pub residuals: Vec<f64>,
+    /// What the effects add up to, their constant included.
+    pub model: Vec<f64>,
+}
+
+impl Regression {
+    /// Rms of what stays.
+    pub fn rms(&self) -> f64 {
+        (self.residuals.iter().map(|v| v * v).sum::<f64>() / self.residuals.len().max(1) as f64).sqrt()
+    }
+}
+
+/// Fit a constant per span and the effects, with errors that hold in red noise.
+pub fn regress(series: &Series, axis: &Axis, effects: &[Follows]) -> Regression {
+    let equation = equation(series, axis, effects);
+    let design = design(series, &equation);
+    let y = DVector::from_row_slice(&equation.values);
+    let Some(inverse) = design.tr_mul(&design).try_inverse() else {
+        let coefficients = vec![(0.0, f64::MAX); effects.len()];
+        return Regression { coefficients, residuals: axis.values.clone(), model: vec![0.0; axis.values.len()] };
+    };
+    let solution = inverse * design.tr_mul(&y);
+    let residuals: Vec<f64> = (&y - &design * &solution).iter().copied().collect();
+    let covariance = red::covariance(&equation.values, &design, &Beat::new(&series.t_s));
+    let one = |(j, follows): (usize, &Follows)| {
+        let (at, from) = (series.spans + j, if let Follows::Offset(s) = follows { *s } else { 0.0 });
+        (from + solution[at], covariance[(at, at)].max(0.0).sqrt())
+    };
+    let coefficients = effects.iter().enumerate().map(one).collect();
+    let model = axis.values.iter().zip(&residuals).map(|(v, r)| v - r).collect();
+    Regression { coefficients, residuals, model }
+}
+
+/// Constants per span, then the effects about their means.
+fn design(series: &Series, equation: &Equation) -> DMatrix<f64> {
+    let n = series.t_s.len();
+    let mut design = DMatrix::zeros(n, series.spans + equation.columns.len());
+    for (i, span) in series.span.iter().enumerate() {
+        design[(i, *span)] = 1.0;
+    }
+    for (j, column) in equation.columns.iter().enumerate() {
+        let centre = column.iter().sum::<f64>() / n as f64;
+        for (i, x) in column.iter().enumerate() {
+            design[(i, series.spans + j)] = x - centre;
+        }
+    }
+    design
+}
+
+fn likelihood(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> f64 {
+    let equation = equation(series, axis, model);
+    red::twice_log_likelihood(&equation.values, &design(series, &equation), beat)
+}
+
+/// What one axis was found to follow.
+#[derive(Debug, Clone)]
+pub struct AxisFound {
+    /// What its simulation has, estimated with the constant.
+    pub included: Vec<Follows>,
+    /// Effects with their evidence, in the order found.
+    pub effects: Vec<(Follows, f64)>,
+    /// Standard error of the number of each effect that does not enter linearly.
+    pub inner_sigma: Vec<f64>,
+    /// Fits: without, then after each effect.
+    pub fits: Vec<Regression>,
+    /// Evidence of the strongest candidate refused.
+    pub refused: f64,
+}
+
+impl AxisFound {
+    /// The fit with everything found.
+    pub fn last(&self) -> &Regression {
+        &self.fits[self.fits.len() - 1]
+    }
+
+    /// What the simulation has, and what was found.
+    pub fn model(&self) -> Vec<Follows> {
+        self.included.iter().copied().chain(self.effects.iter().map(|(f, _)| *f)).collect()
+    }
+}
+
+/// Search one axis, given what its simulation already has.
+pub fn search(series: &Series, axis: &Axis, included: &[Follows]) -> AxisFound {
+    let beat = Beat::new(&series.t_s);
+    let mut model: Vec<Follows> = included.to_vec();
+    let mut scores = Vec::new();
+    let mut refused = 0.0;
+    for _ in 0..EFFECTS_MAX {
+        let Step { best, strongest } = step(series, axis, &model, &beat);
+        refused = strongest;
+        let Some((candidate, score)) = best else { break };
+        model.push(candidate);
+        scores.push(score);
+        refined(series, axis, &mut model, included.len(), &beat);
+        refused = 0.0;
+    }
+    let mut fits: Vec<Regression> =
+        (0..=scores.len()).map(|n| regress(series, axis, &model[..included.len() + n])).collect();
+    let sigma = |i: usize| inner_sigma(series, axis, &model, i, &beat);
+    let inner_sigma: Vec<f64> = (included.len()..model.len()).map(sigma).collect();
+    let last = scores.len();
+    widen(series, axis, &model, included.len(), &inner_sigma, &mut fits[last].coefficients);
+    let effects = model[included.len()..].iter().copied().zip(scores).collect();
+    AxisFound { included: included.to_vec(), effects, inner_sigma, fits, refused }
+}
+
+struct Step {
+    best: Option<(Follows, f64)>,
+    strongest: f64,
+}
+
+fn step(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Step {
+    let taken = |id: &str| model.iter().any(|f| f.id() == id);
+    let now = likelihood(series, axis, model, beat);
+    let charge = (axis.values.len() as f64).ln();
+    let mut scored: Vec<(Follows, f64)> = Vec::new();
+    let steps = if taken("bias_step") { Vec::new() } else { likely_steps(series, axis, model, beat) };
+    for candidate in candidates(series, axis).into_iter().chain(steps).filter(|c| !taken(c.id())) {
+        let mut with = model.to_vec();
+        with.push(candidate);
+        let score = likelihood(series, axis, &with, beat) - now - candidate.price() * charge;
+        scored.push((candidate, score));
+    }
+    let strongest = scored.iter().map(|(_, score)| *score).fold(0.0, f64::max);
+    scored.retain(|(_, score)| *score >= SCORE_MIN);
+    // A late response has one unknown more than the immediate one to the same covariate, and must earn it.
+    let immediate: Vec<(Follows, f64)> =
+        scored.iter().filter(|(f, _)| matches!(f, Follows::Temperature(_, 0.0))).copied().collect();
+    let earned = |(follows, score): &(Follows, f64)| match follows {
+        Follows::Temperature(k, lag) if *lag > 0.0 => {
+            immediate.iter().all(|(f, s)| *f != Follows::Temperature(*k, 0.0) || *score > s + LATE_MARGIN)
+        }
+        _ => true,
+    };
+    scored.retain(earned);
+    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let before = held_out(series, axis, model);
+    let predicts = |(candidate, _): &(Follows, f64)| {
+        let mut with = model.to_vec();
+        with.push(*candidate);
+        held_out(series, axis, &with) < before
+    };
+    Step { best: scored.into_iter().find(predicts), strongest }
+}
+
+fn candidates(series: &Series, axis: &Axis) -> Vec<Follows> {
+    let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
+    let mut all = Vec::new();
+    for (k, _) in series.covariates.iter().enumerate().filter(|(_, c)| c.is_temperature()) {
+        all.push(Follows::Temperature(k, 0.0));
+        all.extend(LAGS.map(|part| Follows::Temperature(k, part * span_s)));
+    }
+    all.extend(DRIFTS.map(|part| Follows::Drift(part * span_s)));
+    if axis.reference.is_some() {
+        let beat_s = series.beat_s();
+        all.push(Follows::Scale);
+        let tried = OFFSETS.iter().map(|o| o * beat_s).filter(|o| *o < 0.1 * span_s);
+        all.extend(tried.flat_map(|o| if o == 0.0 { vec![0.0] } else { vec![o, -o] }).map(Follows::Offset));
+    }
+    all
+}
+
+/// The instants at which a step is likeliest, each moment between two blocks tried in the noise that the model has without
+/// one; not within a fortieth of either end.
+fn likely_steps(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Vec<Follows> {
+    let without = equation(series, axis, model);
+    let (noise, _) = red::best(&without.values, &design(series, &without), beat);
+    let n = series.t_s.len();
+    let between = |i: usize| 0.5 * (series.t_s[i - 1] + series.t_s[i]);
+    let at = |i: usize| {
+        let mut with = model.to_vec();
+        with.push(Follows::Step(between(i)));
+        let equation = equation(series, axis, &with);
+        (i, red::in_noise(&equation.values, &design(series, &equation), beat, noise))
+    };
+    let margin = (n / 40).max(2);
+    let mut tried: Vec<(usize, f64)> = (margin..n - margin).map(at).collect();
+    tried.sort_by(|a, b| b.1.total_cmp(&a.1));
+    tried.iter().take(STEPS).map(|(i, _)| Follows::Step(between(*i))).collect()
+}
+
+/// Move the inner number of every effect found to where the likelihood is best, one after the other.
+fn refined(series: &Series, axis: &Axis, model: &mut [Follows], from: usize, beat: &Beat) {
+    let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
+    for i in from..model.len() {
+        let at = |model: &mut [Follows], s: f64| {
+            model[i] = model[i].with_inner(s);
+            likelihood(series, axis, model, beat)
+        };
+        match model[i] {
+            Follows::Temperature(_, s) | Follows::Drift(s) if s > 0.0 => {
+                let log = golden(s.ln() - 0.7, s.ln() + 0.7, 14, &mut |x| at(model, x.exp()));
+                model[i] = model[i].with_inner(log.exp());
+            }
+            Follows::Step(s) => {
+                let near = 4.0 * series.beat_s();
+                let between = |i: usize| 0.5 * (series.t_s[i - 1] + series.t_s[i]);
+                let edges = (1..series.t_s.len()).map(between).filter(|t| (t - s).abs() <= near);
+                let best = edges.map(|t| (t, at(model, t))).max_by(|a, b| a.1.total_cmp(&b.1));
+                model[i] = Follows::Step(best.map_or(s, |(t, _)| t));
+            }
+            Follows::Offset(_) => {
+                for _ in 0..6 {
+                    let next = plain(series, axis, model)[i];
+                    let Follows::Offset(now) = model[i] else { break };
+                    model[i] = Follows::Offset(next.clamp(-0.2 * span_s, 0.2 * span_s));
+                    if (next - now).abs() < 1e-6 * series.beat_s() {
+                        break;
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Coefficients alone, by least squares.
+fn plain(series: &Series, axis: &Axis, model: &[Follows]) -> Vec<f64> {
+    let equation = equation(series, axis, model);
+    let design = design(series, &equation);
+    let y = DVector::from_row_slice(&equation.values);
+    let Some(inverse) = design.tr_mul(&design).try_inverse() else { return vec![0.0; model.len()] };
+    let solution = inverse * design.tr_mul(&y);
+    let from = |f: &Follows| if let Follows::Offset(s) = f { *s } else { 0.0 };
+    model.iter().enumerate().map(|(j, f)| from(f) + solution[series.spans + j]).collect()
+}
+
+fn golden(mut low: f64, mut high: f64, steps: usize, value: &mut dyn FnMut(f64) -> f64) -> f64 {
+    let (mut a, mut b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+    let (mut fa, mut fb) = (value(a), value(b));
+    for _ in 0..steps {
+        if fa > fb {
+            (high, b, fb) = (b, a, fa);
+            a = high - GOLDEN * (high - low);
+            fa = value(a);
+        } else {
+            (low, a, fa) = (a, b, fb);
+            b = low + GOLDEN * (high - low);
+            fb = value(b);
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// How far the inner number may move, either way, before twice the log likelihood has fallen by one.
+fn inner_sigma(series: &Series, axis: &Axis, model: &[Follows], i: usize, beat: &Beat) -> f64 {
+    let Some(best) = model[i].inner() else { return 0.0 };
+    if matches!(model[i], Follows::Offset(_)) {
+        return 0.0;
+    }
+    let beat_s = series.beat_s();
+    let top = likelihood(series, axis, model, beat);
+    let falls = |s: f64| {
+        let mut moved = model.to_vec();
+        moved[i] = moved[i].with_inner(s);
+        top - likelihood(series, axis, &moved, beat) >= 1.0
+    };
+    let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
+    let reach = |sign: f64| {
+        let mut away = 0.25 * beat_s;
+        while away < span_s && best + sign * away > 0.0 && !falls(best + sign * away) {
+            away *= 1.4;
+        }
+        away
+    };
+    let up = reach(1.0);
+    let down = if best > 0.0 { reach(-1.0) } else { up };
+    // An instant is known to a sample at best, and evenly within it.
+    let floor = if matches!(model[i], Follows::Step(_)) { beat_s / 12f64.sqrt() } else { 0.0 };
+    (0.5 * (up + down)).max(floor)
+}
+
+/// Add to each coefficient's error what the errors of the inner numbers do to it.
+fn widen(
+    series: &Series,
+    axis: &Axis,
+    model: &[Follows],
+    from: usize,
+    sigmas: &[f64],
+    coefficients: &mut [(f64, f64)],
+) {
+    for (k, sigma) in sigmas.iter().enumerate().filter(|(_, sigma)| **sigma > 0.0) {
+        let moved = |by: f64| {
+            let mut with = model.to_vec();
+            let inner = with[from + k].inner().unwrap_or(0.0);
+            with[from + k] = with[from + k].with_inner((inner + by).max(1e-3 * series.beat_s()));
+            plain(series, axis, &with)
+        };
+        let (up, down) = (moved(*sigma), moved(-sigma));
+        for (j, (_, error)) in coefficients.iter_mut().enumerate() {
+            *error = error.hypot(0.5 * (up[j] - down[j]));
+        }
+    }
+}
+
+/// Rms of the prediction of blocks left out in turn, a constant per span known only from the rest.
+pub fn held_out(series: &Series, axis: &Axis, effects: &[Follows]) -> f64 {
+    let equation = equation(series, axis, effects);
+    let (design, values) = (design(series, &equation), &equation.values);
+    let block_s = HELD_OUT_S.min(series.shortest_span_s() / 8.0).max(1e-9);
+    let fold = |t: f64| (((t - series.t_s[0]) / block_s) as usize) % 2;
+    let mut squares = 0.0;
+    for left_out in 0..2 {
+        let rows = |wanted: bool| {
+            (0..values.len()).filter(|i| (fold(series.t_s[*i]) == left_out) == wanted).collect::<Vec<usize>>()
+        };
+        let (kept, missed) = (rows(false), rows(true));
+        let (x, y) = (design.select_rows(&kept), DVector::from_iterator(kept.len(), kept.iter().map(|i| values[*i])));
+        let Some(inverse) = x.tr_mul(&x).try_inverse() else { return f64::INFINITY };
+        let solution = inverse * x.tr_mul(&y);
+        let predicted = design.select_rows(&missed) * solution;
+        squares += missed.iter().zip(predicted.iter()).map(|(i, p)| (values[*i] - p).powi(2)).sum::<f64>();
+    }
+    (squares / values.len() as f64).sqrt()
+}
+
+/// What the simulation has beside the constant and the reference, with the numbers that its own fit prefers.
+pub fn included(case: &MeasuredCase, series: &Series, axis: &Axis) -> Result<Vec<Follows>, MeasuredError> {
+    let beat = Beat::new(&series.t_s);
+    let mut model = Vec::new();
+    for token in case.includes.iter().filter(|t| !matches!(t.as_str(), "constant" | "reference")) {
+        let likely = |f: &Follows| likelihood(series, axis, std::slice::from_ref(f), &beat);
+        let steps = likely_steps(series, axis, &model, &beat);
+        let of_kind =
+            candidates(series, axis).into_iter().chain(steps).filter(|c| c.id() == token).map(|c| (c, likely(&c)));
+        let Some((follows, _)) = of_kind.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            return Err(case.wrong(
+                "simulation.includes",
+                "some of constant, reference, temperature_bias (with a temperature among the covariates), bias_drift, bias_step, \
+                 scale_factor and time_offset (with a reference)",
+            ));
+        };
+        model.push(follows);
+        refined(series, axis, &mut model, 0, &beat);
+    }
+    Ok(model)
+}
