@@ -51,7 +51,16 @@ fn deframe(stream: &[u8]) -> usize {
     frames
 }
 
+/// What this runs on.
+fn machine() -> String {
+    let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = cpus.lines().find_map(|line| line.strip_prefix("model name")?.split(':').nth(1));
+    let cores = std::thread::available_parallelism().map_or(0, usize::from);
+    format!("{}, {cores} cores", model.map_or("an unnamed processor", str::trim))
+}
+
 fn sync(c: &mut Criterion) {
+    println!("machine: {}", machine());
     let aligned = stream();
     let reversed = reversed_and_shifted(&aligned);
     let noise: Vec<u8> = {

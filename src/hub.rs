@@ -9,9 +9,10 @@ pub mod journal;
 mod message;
 mod reader;
 pub mod status;
+pub mod told;
 pub mod wire;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
 use std::sync::{Arc, Mutex, RwLock};
 use std::time::Instant;
 
@@ -22,7 +23,8 @@ use crate::telemetry::AccRecord;
 use crate::units::Clock;
 use journal::Entry;
 pub use message::{Body, Message, Topic, Topics};
-pub use reader::{Reader, Step};
+pub use reader::{History, Reader, Step};
+use told::Told;
 
 /// Messages published under one hold of the lock, so that readers wait for milliseconds at most.
 const PUBLISHED_AT_ONCE: usize = 512;
@@ -39,12 +41,14 @@ pub trait SampleSource: Send + Sync {
 }
 
 /// A window as it is known now.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Held {
     /// The window.
-    pub product: Product,
+    pub product: Arc<Product>,
     /// Number of the last message about it.
     pub seq: u64,
+    /// The revision that message told: after a restart the product may be a later one until it is told of.
+    pub told: Revision,
 }
 
 /// The newest calibrated window.
@@ -96,6 +100,22 @@ pub struct Journaled {
     pub entries: Vec<Entry>,
     /// First numbers of the entries that fell out of the bound.
     pub forgotten: Vec<u64>,
+    /// Chunks (see [`told`]) with windows told of.
+    pub chunks: BTreeSet<i64>,
+}
+
+impl Journaled {
+    /// Whether the store need not be told anything.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty() && self.forgotten.is_empty() && self.chunks.is_empty()
+    }
+
+    /// Adds what a later publication adds.
+    pub fn extend(&mut self, later: Journaled) {
+        self.entries.extend(later.entries);
+        self.forgotten.extend(later.forgotten);
+        self.chunks.extend(later.chunks);
+    }
 }
 
 impl Hub {
@@ -123,31 +143,48 @@ impl Hub {
         self.spacecraft_id
     }
 
-    /// Takes up where an earlier run ended: its journal, and the windows known at its end.
-    pub fn restore(&self, entries: Vec<Entry>, windows: impl Iterator<Item = Product>) {
+    /// Takes up where an earlier run ended: its journal, what it told of every window, and the number up to which it may have told
+    /// messages that the journal does not hold. `product` gives windows as they are now.
+    pub fn restore(
+        &self,
+        entries: Vec<Entry>,
+        told: impl IntoIterator<Item = Told>,
+        numbered_through: u64,
+        product: impl Fn(Clock) -> Option<Arc<Product>>,
+    ) {
         let mut state = self.state.write().expect("no holder panics");
         state.forgotten_through = entries.first().map_or(0, |entry| entry.first_seq() - 1);
-        state.head_seq = entries.last().map_or(0, Entry::last_seq);
-        let mut seqs: BTreeMap<Clock, u64> = BTreeMap::new();
+        state.head_seq = entries.last().map_or(0, Entry::last_seq).max(numbered_through);
         for entry in &entries {
             state.rings[entry.topic() as usize].last_seq = entry.last_seq();
-            if let Entry::Windows { first_seq, count, first_start, step_tenths, .. } = entry {
-                for n in 0..i64::from(*count) {
-                    seqs.insert(first_start.plus_tenths(n * i64::from(*step_tenths)), first_seq + n as u64);
-                }
-            }
         }
         let head_seq = state.head_seq;
         state.rings.iter_mut().for_each(|ring| ring.dropped_through = head_seq);
-        for product in windows {
-            // A window that was never told of is told of by the next flush.
-            if let Some(&seq) = seqs.get(&product.start) {
-                state.windows.insert(product.start, Held { product, seq });
+        for Told { start, seq, revision } in told {
+            if let Some(product) = product(start) {
+                state.windows.insert(start, Held { product, seq, told: revision });
             }
         }
         state.journal = entries.into_iter().map(Arc::new).collect();
         self.note_latest(&state);
         self.head.send_replace(head_seq);
+    }
+
+    /// Everything told whole that the journal still holds.
+    pub fn told_texts(&self) -> HashSet<(Topic, String)> {
+        let state = self.state.read().expect("no holder panics");
+        let told = state.journal.iter().filter_map(|entry| match &**entry {
+            Entry::Told { topic, json, .. } => Some((*topic, json.clone())),
+            _ => None,
+        });
+        told.collect()
+    }
+
+    /// A chunk of what was told last, as the store keeps it.
+    pub fn told_chunk(&self, chunk: i64) -> Vec<u8> {
+        let state = self.state.read().expect("no holder panics");
+        let held = state.windows.range(told::first_start(chunk)..told::first_start(chunk + 1));
+        told::to_octets(chunk, held.map(|(start, held)| Told { start: *start, seq: held.seq, revision: held.told }))
     }
 
     /// Numbers and publishes messages; what the store's journal must take up.
@@ -161,6 +198,7 @@ impl Hub {
                 state.head_seq += 1;
                 let seq = state.head_seq;
                 note_in_journal(&mut entries, seq, &body);
+                journaled.chunks.extend(body.window_start().map(told::chunk_of));
                 state.take_up(seq, body, self.ring_messages_max);
             }
             state.journal.extend(entries.iter().cloned().map(Arc::new));
@@ -208,7 +246,7 @@ impl Hub {
     /// The revision of a window that was told last.
     pub fn told_revision(&self, start: Clock) -> Option<Revision> {
         let state = self.state.read().expect("no holder panics");
-        state.windows.get(&start).map(|held| held.product.revision)
+        state.windows.get(&start).map(|held| held.told)
     }
 
     fn note_latest(&self, state: &State) {
@@ -217,7 +255,7 @@ impl Hub {
         if let Some(held) = newest
             && latest.is_none_or(|latest| latest.product.revision != held.product.revision)
         {
-            *latest = Some(Latest { product: held.product, since: Instant::now() });
+            *latest = Some(Latest { product: *held.product, since: Instant::now() });
         }
     }
 
@@ -242,7 +280,7 @@ impl Hub {
             return Vec::new();
         }
         let state = self.state.read().expect("no holder panics");
-        state.windows.range(from..=to).map(|(_, held)| held.product).collect()
+        state.windows.range(from..=to).map(|(_, held)| *held.product).collect()
     }
 
     /// Start of the first and of the last window.
@@ -255,7 +293,7 @@ impl Hub {
 impl State {
     fn take_up(&mut self, seq: u64, body: Body, ring_messages_max: usize) {
         if let Body::Window(product) | Body::Supersede(product, _) = &body {
-            self.windows.insert(product.start, Held { product: *product, seq });
+            self.windows.insert(product.start, Held { product: product.clone(), seq, told: product.revision });
         }
         let ring = &mut self.rings[body.topic() as usize];
         ring.last_seq = seq;

@@ -34,7 +34,19 @@ enum Command {
     Challenge(command::challenge::Args),
 }
 
+/// A reader that goes away (`oare diagnose CASE | head -1`) ends the command, and is no failure to report.
+fn end_when_nobody_reads() {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if panic.payload_as_str().is_some_and(|text| text.starts_with("failed printing to stdout")) {
+            std::process::exit(0);
+        }
+        report(panic);
+    }));
+}
+
 fn main() -> ExitCode {
+    end_when_nobody_reads();
     let done = match Arguments::parse().command {
         Command::Process(args) => command::process::run(args),
         Command::Simulate(args) => command::simulate::run(args),
@@ -46,7 +58,7 @@ fn main() -> ExitCode {
         Command::Challenge(args) => command::challenge::run(args),
     };
     done.unwrap_or_else(|error| {
-        eprintln!("oare: {error:#}");
+        eprintln!("oare: {}", command::told_once(&error));
         command::failed()
     })
 }

@@ -10,7 +10,7 @@ use utoipa::{IntoParams, ToSchema};
 use super::App;
 use super::problem::Problem;
 use super::query::optional_clock;
-use crate::hub::wire::{Gap, Time, Window};
+use crate::hub::wire::{self, BodyAxes, Gap, Time};
 use crate::pipeline::Product;
 use crate::units::Clock;
 
@@ -22,30 +22,9 @@ pub struct Accel {
     pub time: Time,
     /// `orbiter_body`: +X tail to nose, +Y to starboard, +Z down through the belly.
     pub frame: &'static str,
-    /// Quasi-steady acceleration from the adaptive trimmed mean, ng.
-    pub ax_ng: Option<f64>,
-    /// As `ax_ng`.
-    pub ay_ng: Option<f64>,
-    /// As `ax_ng`.
-    pub az_ng: Option<f64>,
-    /// One statistical standard error of `ax_ng`, ng.
-    pub sigma_ax_ng: Option<f64>,
-    /// Of `ay_ng`.
-    pub sigma_ay_ng: Option<f64>,
-    /// Of `az_ng`.
-    pub sigma_az_ng: Option<f64>,
-    /// The systematic part, to be added in quadrature, ng.
-    pub sigma_sys_ax_ng: Option<f64>,
-    /// Of `ay_ng`.
-    pub sigma_sys_ay_ng: Option<f64>,
-    /// Of `az_ng`.
-    pub sigma_sys_az_ng: Option<f64>,
-    /// From the plain mean of the window, ng.
-    pub mean_ax_ng: Option<f64>,
-    /// As `mean_ax_ng`.
-    pub mean_ay_ng: Option<f64>,
-    /// As `mean_ax_ng`.
-    pub mean_az_ng: Option<f64>,
+    /// The value and its standard errors.
+    #[serde(flatten)]
+    pub acceleration: BodyAxes,
     /// Time since this service came to know the value, s.
     pub age_s: f64,
     /// `good`, or reasons for care.
@@ -63,26 +42,14 @@ pub struct Accel {
     responses((status = 200, body = Accel), (status = 404, description = "there is none yet")))]
 pub async fn accel(State(app): State<Arc<App>>) -> Result<Json<Accel>, Problem> {
     let latest = app.hub.latest().ok_or_else(|| Problem::not_found("there is no calibrated window yet"))?;
-    let window = Window::new(&app.mission, &latest.product);
     Ok(Json(Accel {
         time: Time::new(&app.mission, latest.product.start),
         frame: "orbiter_body",
-        ax_ng: window.ax_ng,
-        ay_ng: window.ay_ng,
-        az_ng: window.az_ng,
-        sigma_ax_ng: window.sigma_ax_ng,
-        sigma_ay_ng: window.sigma_ay_ng,
-        sigma_az_ng: window.sigma_az_ng,
-        sigma_sys_ax_ng: window.sigma_sys_ax_ng,
-        sigma_sys_ay_ng: window.sigma_sys_ay_ng,
-        sigma_sys_az_ng: window.sigma_sys_az_ng,
-        mean_ax_ng: window.mean_ax_ng,
-        mean_ay_ng: window.mean_ay_ng,
-        mean_az_ng: window.mean_az_ng,
+        acceleration: BodyAxes::new(latest.product.acceleration.as_ref()),
         age_s: (latest.since.elapsed().as_secs_f64() * 1000.0).round() / 1000.0,
-        quality: window.quality,
-        calibration: window.calibration,
-        revision: window.revision,
+        quality: latest.product.quality.to_string(),
+        calibration: latest.product.calibration,
+        revision: latest.product.revision.to_string(),
         source: format!("{}/{:#x}", app.hub.mission(), app.hub.spacecraft_id()),
     }))
 }
@@ -113,14 +80,9 @@ pub struct Spread {
 /// Windows taken together.
 #[derive(Debug, Clone, Serialize, ToSchema)]
 pub struct Bucket {
-    /// Start of the first window in it, clock s.
-    pub from_clock_s: f64,
-    /// End of the last window in it, clock s.
-    pub to_clock_s: f64,
-    /// UTC of `from_clock_s`.
-    pub from_utc: String,
-    /// UTC of `to_clock_s`.
-    pub to_utc: String,
+    /// From the start of the first window in it to the end of the last.
+    #[serde(flatten)]
+    pub span: wire::Span,
     /// Windows in it.
     pub count: usize,
     /// Windows with an acceleration.
@@ -228,10 +190,7 @@ fn bucket(app: &App, products: &[Product]) -> Bucket {
     };
     let worst = products.iter().map(|product| product.quality).max_by_key(|quality| (quality.reasons(), *quality));
     Bucket {
-        from_clock_s: first.start.seconds(),
-        to_clock_s: end.seconds(),
-        from_utc: crate::hub::wire::utc(&app.mission, first.start),
-        to_utc: crate::hub::wire::utc(&app.mission, end),
+        span: wire::Span::new(&app.mission, first.start, end),
         count: products.len(),
         calibrated: n,
         ax_ng: spread(0),

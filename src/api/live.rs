@@ -17,7 +17,7 @@ use super::problem::Problem;
 use super::query::clock;
 use crate::hub::status::count;
 use crate::hub::wire::message_members;
-use crate::hub::{Message, Reader, Step, Topic, Topics};
+use crate::hub::{Message, Step, Topic, Topics};
 use crate::units::Clock;
 
 /// Messages written before the socket is flushed.
@@ -103,10 +103,14 @@ struct Client<'a> {
 
 async fn serve(app: &Arc<App>, socket: WebSocket, from: From, topics: Topics) -> Result<(), Gone> {
     let (sink, mut incoming) = socket.split();
-    let (history, after) = match from {
-        From::Now => (Vec::new(), app.hub.head_seq()),
-        From::Seq(seq) => (Vec::new(), seq),
-        From::Clock(clock) => app.hub.known_from(clock, topics),
+    let history = match from {
+        From::Clock(clock) => Some(app.hub.known_from(clock, topics)),
+        From::Now | From::Seq(_) => None,
+    };
+    let after = match (from, &history) {
+        (From::Seq(seq), _) => seq,
+        (_, Some(history)) => history.after(),
+        (_, None) => app.hub.head_seq(),
     };
     let prev = match from {
         From::Now | From::Seq(_) => app.hub.last_seq_on(topics, after),
@@ -114,14 +118,19 @@ async fn serve(app: &Arc<App>, socket: WebSocket, from: From, topics: Topics) ->
     };
     let mut client = Client { app, socket: sink, topics, prev };
     client.hello(from, after).await?;
-    for messages in history.chunks(AT_ONCE) {
-        client.send(messages).await?;
+    if let Some(mut history) = history {
+        loop {
+            let messages = off_the_runtime(topics, || history.next(AT_ONCE));
+            if messages.is_empty() {
+                break;
+            }
+            client.send(&messages).await?;
+        }
     }
-    drop(history);
     let mut reader = app.hub.reader(topics, after, Some(app.live_behind_max));
     let mut ping = tokio::time::interval(PING_EVERY);
     loop {
-        match next(&mut reader, topics) {
+        match off_the_runtime(topics, || reader.next(AT_ONCE)) {
             Some(Step::Messages(messages)) => client.send(&messages).await?,
             Some(Step::Lag { from_seq, to_seq, count }) => client.lag(from_seq, to_seq, count).await?,
             None => tokio::select! {
@@ -138,11 +147,8 @@ async fn serve(app: &Arc<App>, socket: WebSocket, from: From, topics: Topics) ->
 }
 
 /// Raw samples come out of the station, which the writer may hold: other tasks must not wait with this one.
-fn next(reader: &mut Reader, topics: Topics) -> Option<Step> {
-    match topics.has(Topic::Raw) {
-        true => tokio::task::block_in_place(|| reader.next(AT_ONCE)),
-        false => reader.next(AT_ONCE),
-    }
+fn off_the_runtime<T>(topics: Topics, read: impl FnOnce() -> T) -> T {
+    if topics.has(Topic::Raw) { tokio::task::block_in_place(read) } else { read() }
 }
 
 impl Client<'_> {

@@ -110,7 +110,11 @@ pub async fn events(State(app): State<Arc<App>>) -> Json<Vec<EventWire>> {
 /// What the ground found odd, in order of time.
 #[utoipa::path(get, path = "/anomalies", tag = "telemetry", responses((status = 200, body = [AnomalyWire])))]
 pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
-    Json(ask(&app, |station| station.derived().anomalies.iter().map(AnomalyWire::new).collect()).await)
+    let mission = app.mission;
+    let told = move |station: &Station| -> Vec<AnomalyWire> {
+        station.derived().anomalies.iter().map(|anomaly| AnomalyWire::new(&mission, anomaly)).collect()
+    };
+    Json(ask(&app, told).await)
 }
 
 /// What the simulation lacks: the running diagnosis with its progress, or, where none runs, the `diagnosis.json` that lies in the

@@ -85,6 +85,8 @@ pub struct AccelStatus {
     pub events: u64,
     /// Anomalies known.
     pub anomalies: u64,
+    /// Everything durable is in the products: no window waits for its other half, no calibration for its turn.
+    pub settled: bool,
 }
 
 /// The WebSocket.
@@ -144,6 +146,7 @@ pub async fn status(State(app): State<Arc<App>>) -> Json<Status> {
             calibration: picture.calibration,
             events: picture.events,
             anomalies: picture.anomalies,
+            settled: picture.settled,
         },
         live: LiveStatus {
             head_seq: app.hub.head_seq(),

@@ -132,7 +132,7 @@ fn fly(mission: &Mission, to: SocketAddr, speed: Speed, seed: u64, over: &Cancel
             if over.is_cancelled() {
                 return Ok(());
             }
-            send(&playback.octets, to, Speed::Max)?;
+            send(&playback.octets, to, Speed::Max, &link)?;
         }
         Ok(())
     };

@@ -112,7 +112,7 @@ fn write_recording(log: &RawLog, station: &Station, out: &std::path::Path, from:
     }
     let products = station.products().filter(|product| (from..=to).contains(&product.start));
     for (seq, product) in (1..).zip(products) {
-        recording.message(&Message::new(seq, Body::Window(*product)))?;
+        recording.message(&Message::new(seq, Body::Window((*product).into())))?;
     }
     recording.finish()?;
     Ok(())

@@ -88,8 +88,9 @@ fn read_stream(path: &Path, link: LinkConfig) -> Result<Stream> {
     if !mcap_reader::is_mcap(&octets) {
         return Ok(Stream { link, octets });
     }
-    let octets = mcap_reader::dump(&octets).with_context(|| format!("cannot use {}", path.display()))?;
-    Ok(Stream { link: LinkConfig { randomised: false, reed_solomon_interleave: None, ..link }, octets })
+    let link = LinkConfig { randomised: false, reed_solomon_interleave: None, ..link };
+    let octets = mcap_reader::dump(&octets, &link).with_context(|| format!("cannot use {}", path.display()))?;
+    Ok(Stream { link, octets })
 }
 
 /// Reads every stream; parts come with the number of their playback.
@@ -133,7 +134,7 @@ fn write_recording(station: &Station, streams: &[Stream], path: &Path) -> Result
     });
     written.with_context(cannot)?;
     for (seq, product) in (1..).zip(station.products()) {
-        recording.message(&Message::new(seq, Body::Window(*product))).with_context(cannot)?;
+        recording.message(&Message::new(seq, Body::Window((*product).into()))).with_context(cannot)?;
     }
     recording.finish().with_context(cannot)?;
     Ok(())

@@ -25,6 +25,9 @@ pub struct Args {
     /// Times the recorded pace, or `max`.
     #[arg(long, default_value = "max")]
     speed: Speed,
+    /// Configuration file with the link the dumps were made for; the standard link without it.
+    #[arg(long)]
+    config: Option<PathBuf>,
 }
 
 /// How fast to send.
@@ -52,6 +55,13 @@ impl FromStr for Speed {
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
+    let link = match super::serve::read_config(args.config) {
+        Ok(config) => config.settings.link,
+        Err(error) => {
+            eprintln!("oare replay: {error:#}");
+            return Ok(super::unusable());
+        }
+    };
     let mut dumps = Vec::new();
     for path in &args.files {
         let octets = match fs::read(path) {
@@ -62,26 +72,26 @@ pub fn run(args: Args) -> Result<ExitCode> {
             }
         };
         let dump = match mcap_reader::is_mcap(&octets) {
-            true => mcap_reader::dump(&octets).with_context(|| format!("cannot use {}", path.display()))?,
+            true => mcap_reader::dump(&octets, &link).with_context(|| format!("cannot use {}", path.display()))?,
             false => octets,
         };
         dumps.push((path, dump));
     }
     for (path, dump) in &dumps {
         eprintln!("oare replay: {} to {}", path.display(), args.to);
-        send(dump, args.to, args.speed)?;
+        send(dump, args.to, args.speed, &link)?;
     }
     Ok(super::DONE)
 }
 
 /// Sends one dump over one connection.
-pub fn send(dump: &[u8], to: SocketAddr, speed: Speed) -> Result<()> {
+pub fn send(dump: &[u8], to: SocketAddr, speed: Speed, link: &LinkConfig) -> Result<()> {
     let mut stream = TcpStream::connect(to).with_context(|| format!("cannot connect to {to}"))?;
     let bar = ProgressBar::new(dump.len() as u64);
     bar.set_style(ProgressStyle::with_template("{bar:40} {bytes}/{total_bytes} {bytes_per_sec} {eta}")?);
     let sent = match speed {
         Speed::Max => send_all(&mut stream, dump, &bar),
-        Speed::Times(times) => send_paced(&mut stream, dump, times, &bar),
+        Speed::Times(times) => send_paced(&mut stream, dump, times, link, &bar),
     };
     bar.finish_and_clear();
     match sent {
@@ -101,14 +111,13 @@ fn send_all(stream: &mut TcpStream, dump: &[u8], bar: &ProgressBar) -> std::io::
 }
 
 /// Where in the dump so much recorded time has passed: octet and clock, as the frames arrive.
-fn pace(dump: &[u8]) -> Vec<(usize, f64)> {
-    let link = LinkConfig::default();
+fn pace(dump: &[u8], link: &LinkConfig) -> Vec<(usize, f64)> {
     let mut marks: Vec<(usize, f64)> = Vec::new();
-    let mut reader = PlaybackReader::new(link);
+    let mut reader = PlaybackReader::new(*link);
     let mut note = |part: PlaybackPart| {
         if let PlaybackPart::Arrival(arrival) = part
             && let Verdict::Good(_) = arrival.verdict
-            && let Some(clock) = frame_clock(&link, &arrival.octets)
+            && let Some(clock) = frame_clock(link, &arrival.octets)
         {
             let end = (arrival.first_bit / 8) as usize + arrival.octets.len();
             marks.push((end.min(dump.len()), clock.seconds()));
@@ -119,8 +128,14 @@ fn pace(dump: &[u8]) -> Vec<(usize, f64)> {
     marks
 }
 
-fn send_paced(stream: &mut TcpStream, dump: &[u8], times: f64, bar: &ProgressBar) -> std::io::Result<()> {
-    let marks = pace(dump);
+fn send_paced(
+    stream: &mut TcpStream,
+    dump: &[u8],
+    times: f64,
+    link: &LinkConfig,
+    bar: &ProgressBar,
+) -> std::io::Result<()> {
+    let marks = pace(dump, link);
     let start = Instant::now();
     let (mut sent, mut recorded_s) = (0, 0.0);
     let mut last_clock_s = marks.first().map_or(0.0, |mark| mark.1);

@@ -1,6 +1,6 @@
 //! What is told to readers: numbered messages on topics.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use bytes::Bytes;
 
@@ -83,9 +83,9 @@ impl Topics {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Body {
     /// A window, for the first time.
-    Window(Product),
+    Window(Arc<Product>),
     /// A later revision of a window.
-    Supersede(Product, Option<Revision>),
+    Supersede(Arc<Product>, Option<Revision>),
     /// One second of raw samples.
     Second(Box<AccRecord>),
     /// Anything else, in its JSON members, `"type"` first.

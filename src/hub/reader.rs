@@ -1,5 +1,6 @@
 //! A reader's position, and what comes after it.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use tokio::sync::watch;
@@ -44,26 +45,28 @@ impl Hub {
         Reader { hub: self.clone(), topics, after, behind_max, newest_only: false, head: self.head.subscribe() }
     }
 
-    /// What is known from a clock on, each window once and in its present revision, in the order of the messages about it; and the
-    /// message after which a reader goes on. Raw samples are left out.
-    pub fn known_from(&self, from: Clock, topics: Topics) -> (Vec<Arc<Message>>, u64) {
+    /// What is known from a clock on, each window once and in its present revision, in the order of the messages about it.
+    pub fn known_from(self: &Arc<Self>, from: Clock, topics: Topics) -> History {
         let state = self.state.read().expect("no holder panics");
         let mut messages = Vec::new();
+        let mut seconds = VecDeque::new();
         if topics.has(super::Topic::Window) {
             let held = state.windows.range(from..).map(|(_, held)| held);
-            messages.extend(held.map(|held| Arc::new(Message::new(held.seq, Body::Window(held.product)))));
+            messages.extend(held.map(|held| Arc::new(Message::new(held.seq, Body::Window(held.product.clone())))));
         }
-        for entry in &state.journal {
-            if let Entry::Told { seq, topic, clock, json } = &**entry
-                && topics.has(*topic)
-                && *clock >= from
-            {
-                let body = Body::Told { topic: *topic, clock: *clock, json: json.clone() };
-                messages.push(Arc::new(Message::new(*seq, body)));
+        for entry in state.journal.iter().filter(|entry| topics.has(entry.topic())) {
+            match &**entry {
+                Entry::Told { seq, topic, clock, json } if *clock >= from => {
+                    let body = Body::Told { topic: *topic, clock: *clock, json: json.clone() };
+                    messages.push(Arc::new(Message::new(*seq, body)));
+                }
+                Entry::Seconds { .. } => seconds.push_back(entry.clone()),
+                Entry::Told { .. } | Entry::Windows { .. } => {}
             }
         }
         messages.sort_by_key(|message| message.seq);
-        (messages, state.head_seq)
+        let read_through = seconds.front().map_or(0, |entry| entry.first_seq() - 1);
+        History { hub: self.clone(), from, messages: messages.into(), seconds, read_through, after: state.head_seq }
     }
 
     /// Number of the last message on these topics up to a message.
@@ -76,6 +79,61 @@ impl Hub {
         let at = state.journal.partition_point(|entry| entry.first_seq() <= through);
         let before = state.journal.range(..at).rev().find(|entry| topics.has(entry.topic()));
         before.map_or(0, |entry| entry.last_seq().min(through))
+    }
+}
+
+/// What is known from a clock on, handed on some at a time; raw samples are read again as they are wanted.
+pub struct History {
+    hub: Arc<Hub>,
+    from: Clock,
+    messages: VecDeque<Arc<Message>>,
+    /// Runs of raw samples, and the message up to which they are read.
+    seconds: VecDeque<Arc<Entry>>,
+    read_through: u64,
+    after: u64,
+}
+
+impl History {
+    /// Number of the message after which a reader goes on.
+    pub fn after(&self) -> u64 {
+        self.after
+    }
+
+    /// The next messages, at most so many; none when it is over.
+    pub fn next(&mut self, messages_max: usize) -> Vec<Arc<Message>> {
+        let mut next = Vec::new();
+        while next.len() < messages_max {
+            let second = self.next_second();
+            let told = self.messages.front().map(|message| message.seq);
+            match (second, told) {
+                (Some((seq, clock)), told) if told.is_none_or(|told| seq < told) => {
+                    self.read_through = seq;
+                    let record = self.hub.samples.second(clock);
+                    next.extend(record.map(|record| Arc::new(Message::new(seq, Body::Second(Box::new(record))))));
+                }
+                (_, Some(_)) => next.extend(self.messages.pop_front()),
+                (_, None) => break,
+            }
+        }
+        next
+    }
+
+    /// The next second of raw samples that is late enough.
+    fn next_second(&mut self) -> Option<(u64, Clock)> {
+        loop {
+            let entry = self.seconds.front()?;
+            let mut later = (self.read_through + 1).max(entry.first_seq())..=entry.last_seq();
+            match later.find(|seq| entry.clock_of(*seq) >= self.from) {
+                Some(seq) => {
+                    self.read_through = seq - 1;
+                    return Some((seq, entry.clock_of(seq)));
+                }
+                None => {
+                    self.read_through = entry.last_seq();
+                    self.seconds.pop_front();
+                }
+            }
+        }
     }
 }
 
@@ -128,10 +186,12 @@ impl Reader {
         let mut messages = Vec::new();
         let mut clocks = Vec::new();
         let at = state.journal.partition_point(|entry| entry.last_seq() <= self.after);
+        let mut read_through = head;
         for entry in state.journal.range(at..) {
             let first = entry.first_seq().max(self.after + 1);
             let room = messages_max.saturating_sub(messages.len() + clocks.len()) as u64;
             if room == 0 {
+                read_through = self.after;
                 break;
             }
             if !self.topics.has(entry.topic()) {
@@ -148,7 +208,13 @@ impl Reader {
                 }
             }
             self.after = last;
+            if last < entry.last_seq() {
+                read_through = last;
+                break;
+            }
         }
+        // Numbers between the last entry and the head were left out after a crash.
+        self.after = read_through;
         drop(state);
         if !clocks.is_empty() {
             let seconds = clocks.into_iter().filter_map(|(seq, clock)| Some((seq, hub.samples.second(clock)?)));
@@ -184,7 +250,7 @@ impl State {
         let body = match entry {
             Entry::Told { topic, clock, json, .. } => Body::Told { topic: *topic, clock: *clock, json: json.clone() },
             Entry::Windows { supersedes, .. } => {
-                let product = self.windows.get(&entry.clock_of(seq))?.product;
+                let product = self.windows.get(&entry.clock_of(seq))?.product.clone();
                 if *supersedes { Body::Supersede(product, None) } else { Body::Window(product) }
             }
             Entry::Seconds { .. } => return None,

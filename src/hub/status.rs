@@ -41,6 +41,8 @@ pub struct Picture {
     pub events: u64,
     /// Anomalies known.
     pub anomalies: u64,
+    /// Everything durable is in the products.
+    pub settled: bool,
 }
 
 /// What is being counted while it happens.

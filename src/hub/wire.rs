@@ -2,12 +2,14 @@
 //!
 //! The names are those of `windows.csv`; accelerations in ng with three decimals, an unknown value is `null`.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::message::{Body, Message};
 use crate::pipeline::calibration::Anomaly;
-use crate::pipeline::product::{BodyVector, Product};
+use crate::pipeline::product::{BodyAcceleration, BodyVector, Product};
 use crate::telemetry::{AccRecord, Event, Range};
 use crate::units::{Clock, MissionTime};
 
@@ -30,6 +32,38 @@ impl Time {
     }
 }
 
+/// A span in the three ways people read a clock.
+#[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
+pub struct Span {
+    /// Instrument clock at its beginning, s.
+    pub from_clock_s: f64,
+    /// Instrument clock at its end, s.
+    pub to_clock_s: f64,
+    /// Mission elapsed time at its beginning, s.
+    pub from_met_s: f64,
+    /// Mission elapsed time at its end, s.
+    pub to_met_s: f64,
+    /// UTC at its beginning.
+    pub from_utc: String,
+    /// UTC at its end.
+    pub to_utc: String,
+}
+
+impl Span {
+    /// A span of a mission.
+    pub fn new(mission: &MissionTime, from: Clock, to: Clock) -> Self {
+        let (from, to) = (Time::new(mission, from), Time::new(mission, to));
+        Self {
+            from_clock_s: from.clock_s,
+            to_clock_s: to.clock_s,
+            from_met_s: from.met_s,
+            to_met_s: to.met_s,
+            from_utc: from.utc,
+            to_utc: to.utc,
+        }
+    }
+}
+
 /// RFC 3339 with milliseconds.
 pub fn utc(mission: &MissionTime, clock: Clock) -> String {
     format!("{:.3}", mission.utc(clock.seconds()))
@@ -41,6 +75,59 @@ fn decimals(value: f64, decimals: i32) -> f64 {
     (value * scale).round() / scale + 0.0
 }
 
+/// A body-axis acceleration, ng with three decimals; +X tail to nose, +Y to starboard, +Z down through the belly. `null`: unknown.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, ToSchema)]
+pub struct BodyAxes {
+    /// Quasi-steady acceleration from the adaptive trimmed mean, ng.
+    pub ax_ng: Option<f64>,
+    /// As `ax_ng`.
+    pub ay_ng: Option<f64>,
+    /// As `ax_ng`.
+    pub az_ng: Option<f64>,
+    /// One statistical standard error of `ax_ng`, ng.
+    pub sigma_ax_ng: Option<f64>,
+    /// Of `ay_ng`.
+    pub sigma_ay_ng: Option<f64>,
+    /// Of `az_ng`.
+    pub sigma_az_ng: Option<f64>,
+    /// The systematic part, to be added in quadrature, ng.
+    pub sigma_sys_ax_ng: Option<f64>,
+    /// Of `ay_ng`.
+    pub sigma_sys_ay_ng: Option<f64>,
+    /// Of `az_ng`.
+    pub sigma_sys_az_ng: Option<f64>,
+    /// From the plain mean of the window, ng.
+    pub mean_ax_ng: Option<f64>,
+    /// As `mean_ax_ng`.
+    pub mean_ay_ng: Option<f64>,
+    /// As `mean_ax_ng`.
+    pub mean_az_ng: Option<f64>,
+}
+
+impl BodyAxes {
+    /// The wire form of a product's acceleration.
+    pub fn new(acceleration: Option<&BodyAcceleration>) -> Self {
+        let [ax_ng, ay_ng, az_ng] = components(acceleration.map(|a| a.trimmed_ng));
+        let [sigma_ax_ng, sigma_ay_ng, sigma_az_ng] = components(acceleration.map(|a| a.sigma_ng));
+        let [sigma_sys_ax_ng, sigma_sys_ay_ng, sigma_sys_az_ng] = components(acceleration.map(|a| a.sigma_sys_ng));
+        let [mean_ax_ng, mean_ay_ng, mean_az_ng] = components(acceleration.map(|a| a.mean_ng));
+        Self {
+            ax_ng,
+            ay_ng,
+            az_ng,
+            sigma_ax_ng,
+            sigma_ay_ng,
+            sigma_az_ng,
+            sigma_sys_ax_ng,
+            sigma_sys_ay_ng,
+            sigma_sys_az_ng,
+            mean_ax_ng,
+            mean_ay_ng,
+            mean_az_ng,
+        }
+    }
+}
+
 /// One window, with the names of `windows.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 #[allow(missing_docs, reason = "the names are the documentation: they are those of windows.csv")]
@@ -48,18 +135,8 @@ pub struct Window {
     pub window_start_clock_s: f64,
     pub met_s: f64,
     pub utc: String,
-    pub ax_ng: Option<f64>,
-    pub ay_ng: Option<f64>,
-    pub az_ng: Option<f64>,
-    pub sigma_ax_ng: Option<f64>,
-    pub sigma_ay_ng: Option<f64>,
-    pub sigma_az_ng: Option<f64>,
-    pub sigma_sys_ax_ng: Option<f64>,
-    pub sigma_sys_ay_ng: Option<f64>,
-    pub sigma_sys_az_ng: Option<f64>,
-    pub mean_ax_ng: Option<f64>,
-    pub mean_ay_ng: Option<f64>,
-    pub mean_az_ng: Option<f64>,
+    #[serde(flatten)]
+    pub acceleration: BodyAxes,
     pub q_x: Option<f64>,
     pub q_y: Option<f64>,
     pub q_z: Option<f64>,
@@ -86,11 +163,6 @@ fn components(vector: Option<BodyVector>) -> [Option<f64>; 3] {
 impl Window {
     /// The wire form of a product.
     pub fn new(mission: &MissionTime, product: &Product) -> Self {
-        let acceleration = product.acceleration.as_ref();
-        let [ax_ng, ay_ng, az_ng] = components(acceleration.map(|a| a.trimmed_ng));
-        let [sigma_ax_ng, sigma_ay_ng, sigma_az_ng] = components(acceleration.map(|a| a.sigma_ng));
-        let [sigma_sys_ax_ng, sigma_sys_ay_ng, sigma_sys_az_ng] = components(acceleration.map(|a| a.sigma_sys_ng));
-        let [mean_ax_ng, mean_ay_ng, mean_az_ng] = components(acceleration.map(|a| a.mean_ng));
         let [q_x, q_y, q_z] = product.q.map(|q| q.map(|q| decimals(q, 4)));
         let [trim_x, trim_y, trim_z] = product.trim.map(|trim| trim.map(|trim| decimals(trim, 4)));
         let [range_x, range_y, range_z] = product.range.map(|range| range.map(Range::letter));
@@ -99,18 +171,7 @@ impl Window {
             window_start_clock_s: clock_s,
             met_s,
             utc,
-            ax_ng,
-            ay_ng,
-            az_ng,
-            sigma_ax_ng,
-            sigma_ay_ng,
-            sigma_az_ng,
-            sigma_sys_ax_ng,
-            sigma_sys_ay_ng,
-            sigma_sys_az_ng,
-            mean_ax_ng,
-            mean_ay_ng,
-            mean_az_ng,
+            acceleration: BodyAxes::new(product.acceleration.as_ref()),
             q_x,
             q_y,
             q_z,
@@ -214,25 +275,15 @@ impl EventWire {
 /// A span that is not covered.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
 pub struct Gap {
-    /// First second missing, clock s.
-    pub from_clock_s: f64,
-    /// First second that is there again, clock s.
-    pub to_clock_s: f64,
-    /// UTC of `from_clock_s`.
-    pub from_utc: String,
-    /// UTC of `to_clock_s`.
-    pub to_utc: String,
+    /// From the first second missing to the first that is there again.
+    #[serde(flatten)]
+    pub span: Span,
 }
 
 impl Gap {
     /// The wire form of a gap.
     pub fn new(mission: &MissionTime, from: Clock, to: Clock) -> Self {
-        Self {
-            from_clock_s: from.seconds(),
-            to_clock_s: to.seconds(),
-            from_utc: utc(mission, from),
-            to_utc: utc(mission, to),
-        }
+        Self { span: Span::new(mission, from, to) }
     }
 }
 
@@ -241,10 +292,9 @@ impl Gap {
 pub struct AnomalyWire {
     /// Kind, as in `anomalies.json`.
     pub kind: &'static str,
-    /// From when, clock s.
-    pub from_clock_s: f64,
-    /// Until when, clock s.
-    pub to_clock_s: f64,
+    /// From when until when.
+    #[serde(flatten)]
+    pub span: Span,
     /// OARE axes concerned.
     pub axes: Vec<&'static str>,
     /// Size, in `unit`.
@@ -259,11 +309,10 @@ pub struct AnomalyWire {
 
 impl AnomalyWire {
     /// The wire form of an anomaly.
-    pub fn new(anomaly: &Anomaly) -> Self {
+    pub fn new(mission: &MissionTime, anomaly: &Anomaly) -> Self {
         Self {
             kind: anomaly.kind.word(),
-            from_clock_s: anomaly.from.seconds(),
-            to_clock_s: anomaly.to.seconds(),
+            span: Span::new(mission, anomaly.from, anomaly.to),
             axes: anomaly.axes.iter().map(|axis| axis.letter()).collect(),
             value: anomaly.value,
             sigma: anomaly.sigma,
@@ -285,19 +334,28 @@ pub fn members(kind: &str, value: &impl Serialize) -> String {
 
 /// The JSON members of a message, made once and shared by all who read it.
 pub fn message_members<'a>(mission: &MissionTime, message: &'a Message) -> &'a [u8] {
-    message.text.get_or_init(|| {
-        let text = match &message.body {
-            Body::Window(product) => members("window", &Window::new(mission, product)),
-            Body::Supersede(product, supersedes) => {
-                let window = members("supersede", &Window::new(mission, product));
-                match supersedes {
-                    Some(revision) => format!("{window},\"supersedes\":\"{revision}\""),
-                    None => window,
-                }
+    message.text.get_or_init(|| made_members(mission, message).into())
+}
+
+/// The JSON members of a message for one reader alone: made by another reader, or made and not kept.
+pub fn passing_members<'a>(mission: &MissionTime, message: &'a Message) -> Cow<'a, [u8]> {
+    match message.text.get() {
+        Some(text) => Cow::Borrowed(text),
+        None => Cow::Owned(made_members(mission, message).into_bytes()),
+    }
+}
+
+fn made_members(mission: &MissionTime, message: &Message) -> String {
+    match &message.body {
+        Body::Window(product) => members("window", &Window::new(mission, product)),
+        Body::Supersede(product, supersedes) => {
+            let window = members("supersede", &Window::new(mission, product));
+            match supersedes {
+                Some(revision) => format!("{window},\"supersedes\":\"{revision}\""),
+                None => window,
             }
-            Body::Second(record) => members("raw", &RawSecond::new(mission, record)),
-            Body::Told { json, .. } => json.clone(),
-        };
-        text.into()
-    })
+        }
+        Body::Second(record) => members("raw", &RawSecond::new(mission, record)),
+        Body::Told { json, .. } => json.clone(),
+    }
 }

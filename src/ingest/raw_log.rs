@@ -13,8 +13,10 @@ use std::sync::{Mutex, RwLock};
 use redb::{Database, ReadableDatabase, TableDefinition};
 use sha2::{Digest, Sha256};
 
-use super::batch::{self, Stored};
+use super::batch;
+pub use super::batch::Stored;
 use crate::hub::journal;
+use crate::hub::told::{self, Told};
 use crate::ingest::wire::{Arrival, FrameId, Verdict};
 
 const BATCHES: TableDefinition<&[u8], &[u8]> = TableDefinition::new("batches");
@@ -22,9 +24,13 @@ const FRAMES: TableDefinition<&[u8], (u64, u32)> = TableDefinition::new("frames"
 const JOURNAL: TableDefinition<&[u8], &[u8]> = TableDefinition::new("journal");
 /// Under the prefix: the number of batches whose changes are in the journal.
 const JOURNALED: TableDefinition<&[u8], u64> = TableDefinition::new("journaled");
+/// Under the prefix: no message with a larger number was told.
+const NUMBERED: TableDefinition<&[u8], u64> = TableDefinition::new("numbered");
+/// What was told last of every window, in chunks (see `hub::told`).
+const TOLD: TableDefinition<&[u8], &[u8]> = TableDefinition::new("told");
 
 /// The store reads through this much of its own cache; the operating system has more.
-const CACHE_OCTETS: usize = 24 << 20;
+const CACHE_OCTETS: usize = 8 << 20;
 
 /// What happened at the dump port, in the order of the log.
 #[derive(Debug, Clone, PartialEq)]
@@ -204,7 +210,12 @@ impl RawLog {
             for first_seq in journal.forgotten {
                 table.remove(self.key(&first_seq.to_be_bytes()).as_slice())?;
             }
+            let mut told = transaction.open_table(TOLD)?;
+            for (chunk, octets) in journal.told {
+                told.insert(self.key(&chunk_key(*chunk)).as_slice(), octets.as_slice())?;
+            }
             transaction.open_table(JOURNALED)?.insert(self.prefix.as_slice(), journal.batches)?;
+            transaction.open_table(NUMBERED)?.insert(self.prefix.as_slice(), journal.numbered_through)?;
         }
         transaction.commit()?;
         Ok(())
@@ -221,27 +232,29 @@ impl RawLog {
         Ok(())
     }
 
-    /// Reads the whole log in order, one batch at a time, and notes which frames are known.
+    /// Reads the whole log in order, one batch at a time, and notes which frames are known. Repeats come without their octets: see
+    /// [`RawLog::resolve`].
     ///
     /// # Errors
-    /// When the file cannot be read or a batch is damaged; what came before has been handed on.
-    pub fn replay(&self, mut hand_on: impl FnMut(u64, Vec<Entry>)) -> Result<(), StoreError> {
+    /// When the file cannot be read or a batch is damaged; what came before has been handed on. And what `hand_on` says.
+    pub fn replay(
+        &self,
+        mut hand_on: impl FnMut(u64, Vec<Stored>) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
         let mut number = 0;
-        while let Some(stored) = self.stored_batch(number)? {
-            let mut entries = Vec::new();
-            for stored in stored {
+        while let Some(entries) = self.stored_batch(number)? {
+            for stored in &entries {
                 if let Stored::Entry(
                     Entry::Arrival { arrival: Arrival { verdict: Verdict::Good(id), octets, .. }, .. },
                     offset,
-                ) = &stored
+                ) = stored
                 {
                     let digest = Sha256::digest(octets)[..16].try_into().expect("a digest has 32 octets");
                     let place = Place { batch: number, offset: *offset };
                     self.known.lock().expect("no holder panics").insert((*id, digest), place);
                 }
-                entries.push(self.resolve(stored)?);
             }
-            hand_on(number, entries);
+            hand_on(number, entries)?;
             number += 1;
             self.batches.fetch_max(number, Ordering::Release);
         }
@@ -270,10 +283,9 @@ impl RawLog {
         let key = self.key(&number.to_be_bytes());
         self.with_database(|database| {
             let transaction = database.begin_read()?;
-            match transaction.open_table(BATCHES) {
-                Ok(table) => Ok(table.get(key.as_slice())?.map(|guard| guard.value().to_vec())),
-                Err(redb::TableError::TableDoesNotExist(_)) => Ok(None),
-                Err(error) => Err(error.into()),
+            match existing(transaction.open_table(BATCHES))? {
+                Some(table) => Ok(table.get(key.as_slice())?.map(|guard| guard.value().to_vec())),
+                None => Ok(None),
             }
         })
     }
@@ -287,12 +299,11 @@ impl RawLog {
         }
     }
 
-    /// An entry with its frame, from the first copy where it is only referred to.
-    fn resolve(&self, stored: Stored) -> Result<Entry, StoreError> {
-        let (playback, mut arrival, place) = match stored {
-            Stored::Entry(entry, _) => return Ok(entry),
-            Stored::Repeat { playback, arrival, place } => (playback, arrival, place),
-        };
+    /// A repeated arrival with its octets, from the first copy.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or the first copy is not where it should be.
+    pub fn resolve(&self, mut arrival: Arrival, place: Place) -> Result<Arrival, StoreError> {
         let octets = self.recent_batch(place.batch)?;
         let damaged = || StoreError::Damaged {
             number: place.batch,
@@ -300,7 +311,7 @@ impl RawLog {
             found: "a repeat refers to it, and no frame begins there".into(),
         };
         arrival.octets = batch::frame_at(&octets, place.offset).ok_or_else(damaged)?.to_vec();
-        Ok(Entry::Arrival { playback, arrival })
+        Ok(arrival)
     }
 
     fn recent_batch(&self, number: u64) -> Result<std::sync::Arc<Vec<u8>>, StoreError> {
@@ -318,31 +329,71 @@ impl RawLog {
         Ok(octets)
     }
 
-    /// The journal in order, and the number of batches whose changes are in it.
+    /// What was told in earlier runs.
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn journal(&self) -> Result<(Vec<journal::Entry>, u64), StoreError> {
+    pub fn journal(&self) -> Result<Journal, StoreError> {
         let from = self.prefix.clone();
         let to = self.key(&[0xff; 9]);
-        let found = self.with_database(|database| {
+        self.with_database(|database| {
             let transaction = database.begin_read()?;
-            let table = match transaction.open_table(JOURNAL) {
-                Ok(table) => table,
-                Err(redb::TableError::TableDoesNotExist(_)) => return Ok((Vec::new(), 0)),
-                Err(error) => return Err(error.into()),
-            };
-            let mut entries = Vec::new();
-            for row in table.range(from.as_slice()..to.as_slice())? {
-                entries.push(row?.1.value().to_vec());
+            let mut journal = Journal::default();
+            if let Some(table) = existing(transaction.open_table(JOURNAL))? {
+                for row in table.range(from.as_slice()..to.as_slice())? {
+                    journal.entries.extend(journal::Entry::from_octets(row?.1.value()));
+                }
             }
-            let journaled = transaction.open_table(JOURNALED)?;
-            let batches = journaled.get(self.prefix.as_slice())?.map_or(0, |guard| guard.value());
-            Ok((entries, batches))
-        })?;
-        let entries = found.0.iter().filter_map(|octets| journal::Entry::from_octets(octets)).collect();
-        Ok((entries, found.1))
+            if let Some(table) = existing(transaction.open_table(TOLD))? {
+                for row in table.range(from.as_slice()..to.as_slice())? {
+                    let (key, octets) = row?;
+                    if let Some(chunk) = chunk_of_key(&key.value()[self.prefix.len()..]) {
+                        journal.told.extend(told::from_octets(chunk, octets.value()));
+                    }
+                }
+            }
+            let number = |table| -> Result<u64, redb::Error> {
+                match existing(transaction.open_table(table))? {
+                    Some(table) => Ok(table.get(self.prefix.as_slice())?.map_or(0, |guard| guard.value())),
+                    None => Ok(0),
+                }
+            };
+            journal.batches = number(JOURNALED)?;
+            journal.numbered_through = number(NUMBERED)?;
+            Ok(journal)
+        })
     }
+}
+
+/// A table, where anything was ever written to it.
+fn existing<T>(opened: Result<T, redb::TableError>) -> Result<Option<T>, redb::Error> {
+    match opened {
+        Ok(table) => Ok(Some(table)),
+        Err(redb::TableError::TableDoesNotExist(_)) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The key of a chunk, in order of time also before clock 0.
+fn chunk_key(chunk: i64) -> [u8; 8] {
+    (chunk as u64 ^ 1 << 63).to_be_bytes()
+}
+
+fn chunk_of_key(key: &[u8]) -> Option<i64> {
+    key.try_into().ok().map(|octets| (u64::from_be_bytes(octets) ^ 1 << 63) as i64)
+}
+
+/// What was told in earlier runs.
+#[derive(Debug, Default)]
+pub struct Journal {
+    /// Messages, in order.
+    pub entries: Vec<journal::Entry>,
+    /// What was told last of every window.
+    pub told: Vec<Told>,
+    /// Batches whose changes are in it.
+    pub batches: u64,
+    /// No message with a larger number was told.
+    pub numbered_through: u64,
 }
 
 /// What a commit adds to the journal.
@@ -352,6 +403,10 @@ pub struct JournalPart<'a> {
     pub entries: &'a [journal::Entry],
     /// First numbers of entries that fell out of the journal's bound.
     pub forgotten: &'a [u64],
+    /// Chunks of what was told last of every window.
+    pub told: &'a [(i64, Vec<u8>)],
+    /// Until the next commit no message with a larger number is told.
+    pub numbered_through: u64,
     /// Batches whose changes are in the journal once these entries are.
     pub batches: u64,
 }

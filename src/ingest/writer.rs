@@ -12,10 +12,10 @@ use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
 use super::listener::Parts;
-use super::raw_log::{Entry, JournalPart, RawLog, StoreError};
+use super::raw_log::{Entry, Journal, JournalPart, RawLog, StoreError, Stored};
 use crate::hub::status::{Board, Phase, Picture, count};
 use crate::hub::wire::{AnomalyWire, EventWire, Gap, members};
-use crate::hub::{Body, Hub, Journaled, SampleSource, Topic, journal};
+use crate::hub::{Body, Hub, Journaled, SampleSource, Topic};
 use crate::ingest::wire::playback::PlaybackPart;
 use crate::pipeline::files::version_json;
 use crate::pipeline::{Change, PlaybackId, Settings, Station};
@@ -30,6 +30,11 @@ const TICK: Duration = Duration::from_millis(50);
 /// Windows that are not whole are published when nothing came for this long: longer than a window and the pause of its
 /// successor.
 const IDLE_FLUSH: Duration = Duration::from_secs(90);
+/// While more keeps coming, deriving the calibration from everything waits for so many times as long as it took last.
+const CALIBRATION_PAUSES: u32 = 8;
+/// Numbers of messages reserved with every commit: more than are ever told between two. After a crash they are left out, so that no
+/// number is given twice.
+const NUMBERS_AHEAD: u64 = 1 << 24;
 /// A refused write is tried again after this.
 const RETRY: Duration = Duration::from_secs(1);
 
@@ -62,6 +67,8 @@ pub struct Writer {
     /// Batches whose changes are published.
     published: u64,
     flushed: bool,
+    /// When the calibration was derived last, and how long that took.
+    calibrated: Option<(Instant, Duration)>,
 }
 
 impl Writer {
@@ -75,59 +82,58 @@ impl Writer {
         hub: Arc<Hub>,
         board: Arc<Board>,
     ) -> Result<Self, StoreError> {
-        let (entries, journaled) = log.journal()?;
+        let start = Instant::now();
+        let journal = log.journal()?;
+        let messages = journal.entries.len();
+        let mut batch = 0;
+        let mut orphans = Orphans { frame_octets: 0, open: HashMap::new(), next_playback: 0 };
+        {
+            let mut held = station.write().expect("no holder panics");
+            orphans.frame_octets = held.settings().link.frame_octets;
+            held.announce_raw(journal.batches == 0);
+            take_log(&log, &mut held, |station, number, entries| {
+                entries.iter().for_each(|stored| orphans.note(stored));
+                batch = number + 1;
+                // What was told of already is not gathered again.
+                if number < journal.batches {
+                    station.forget_changes();
+                }
+                station.announce_raw(batch >= journal.batches);
+            })?;
+            held.announce_raw(true);
+        }
         let mut writer = Self {
-            log: log.clone(),
+            log,
             station,
             hub,
             board,
-            batch: 0,
-            next_playback: 0,
+            batch,
+            next_playback: orphans.next_playback,
             open: HashMap::new(),
             unjournaled: Journaled::default(),
-            published: journaled,
+            published: journal.batches,
             flushed: true,
+            calibrated: None,
         };
-        let mut orphans: HashMap<u32, (u64, u64)> = HashMap::new();
-        let mut to_restore = Some(entries);
-        log.replay(|number, batch| {
-            if number == journaled {
-                writer.restore_hub(to_restore.take().unwrap_or_default());
-            }
-            batch.iter().for_each(|entry| note_open(&mut orphans, entry));
-            writer.next_playback = batch.iter().map(next_playback).fold(writer.next_playback, u32::max);
-            // What was told of already is not gathered again.
-            writer.station.write().expect("no holder panics").announce_raw(number >= journaled);
-            writer.take(&batch);
-            writer.batch = number + 1;
-            if number >= journaled {
-                writer.settle_and_publish();
-            }
-        })?;
-        if let Some(entries) = to_restore {
-            writer.restore_hub(entries);
-        }
-        writer.published = writer.batch;
-        let mut closing: Vec<Entry> = orphans
-            .into_iter()
-            .map(|(playback, (from_bit, to_bit))| Entry::Closed { playback, bits: to_bit - from_bit })
-            .collect();
-        closing.sort_by_key(next_playback);
-        writer.write(&closing)?;
-        writer.station.write().expect("no holder panics").announce_raw(true);
+        let changes = writer.restore_hub(journal);
+        let closing = orphans.closing();
+        writer.write(&closing, NUMBERS_AHEAD)?;
         writer.take(&closing);
-        writer.set_frames_aside()?;
-        writer.flush();
+        writer.publish_untold(changes);
+        writer.published = writer.batch;
         writer.journal()?;
         writer.show();
+        tracing::info!(batches = batch, journal = messages, took = ?start.elapsed(), "the raw log is taken again");
         Ok(writer)
     }
 
-    /// The hub takes up the journal of an earlier run, with the products as they are now.
-    fn restore_hub(&mut self, entries: Vec<journal::Entry>) {
+    /// The hub takes up the journal of an earlier run; what may have to be told beside it.
+    fn restore_hub(&mut self, journal: Journal) -> Vec<Change> {
         let mut station = self.station.write().expect("no holder panics");
-        station.settle();
-        self.hub.restore(entries, station.products().copied());
+        let changes = station.flush();
+        let product = |start| station.product(start).cloned();
+        self.hub.restore(journal.entries, journal.told, journal.numbered_through, product);
+        changes
     }
 
     /// Works until all connections are gone and everything they brought is durable, or until `give_up`.
@@ -146,9 +152,9 @@ impl Writer {
             match received {
                 Ok(Some(first)) => {
                     let batch = self.gather(first, &mut parts);
-                    self.write_until_durable(&batch, runtime, give_up)?;
+                    self.write_until_durable(&batch, runtime, give_up, NUMBERS_AHEAD)?;
                     self.take(&batch);
-                    self.settle_and_publish();
+                    self.bring_up();
                     self.publish_waiting();
                     self.conclude(&batch, parts.is_empty())?;
                     last_arrival = Instant::now();
@@ -157,6 +163,8 @@ impl Writer {
                 Err(_) => {
                     if !self.flushed && last_arrival.elapsed() > IDLE_FLUSH {
                         self.flush();
+                    } else if self.station.read().expect("no holder panics").calibration_waits() {
+                        self.bring_up();
                     }
                     self.publish_waiting();
                     self.journal_until_durable(runtime, give_up)?;
@@ -165,7 +173,7 @@ impl Writer {
         }
         self.flush();
         self.publish_waiting();
-        self.journal_until_durable(runtime, give_up)
+        self.write_until_durable(&[], runtime, give_up, 0)
     }
 
     /// Everything that is waiting, up to the bound of a batch.
@@ -207,10 +215,13 @@ impl Writer {
     }
 
     /// Makes a batch durable, with the journal so far.
-    fn write(&mut self, batch: &[Entry]) -> Result<(), StoreError> {
+    fn write(&mut self, batch: &[Entry], numbers_ahead: u64) -> Result<(), StoreError> {
+        let told: Vec<_> = self.unjournaled.chunks.iter().map(|chunk| (*chunk, self.hub.told_chunk(*chunk))).collect();
         let journal = JournalPart {
             entries: &self.unjournaled.entries,
             forgotten: &self.unjournaled.forgotten,
+            told: &told,
+            numbered_through: self.hub.head_seq() + numbers_ahead,
             batches: self.published,
         };
         self.log.append(self.batch, batch, &journal)?;
@@ -227,10 +238,11 @@ impl Writer {
         batch: &[Entry],
         runtime: &Handle,
         give_up: &CancellationToken,
+        numbers_ahead: u64,
     ) -> Result<(), StoreError> {
         let mut stuck = false;
         loop {
-            let error = match self.write(batch) {
+            let error = match self.write(batch, numbers_ahead) {
                 Ok(()) => break,
                 Err(error) => error,
             };
@@ -256,21 +268,36 @@ impl Writer {
     }
 
     fn journal(&mut self) -> Result<(), StoreError> {
-        if self.unjournaled.entries.is_empty() { Ok(()) } else { self.write(&[]) }
+        if self.unjournaled.is_empty() { Ok(()) } else { self.write(&[], NUMBERS_AHEAD) }
     }
 
     fn journal_until_durable(&mut self, runtime: &Handle, give_up: &CancellationToken) -> Result<(), StoreError> {
-        if self.unjournaled.entries.is_empty() { Ok(()) } else { self.write_until_durable(&[], runtime, give_up) }
+        if self.unjournaled.is_empty() {
+            return Ok(());
+        }
+        self.write_until_durable(&[], runtime, give_up, NUMBERS_AHEAD)
     }
 
     /// The station takes a durable batch.
     fn take(&mut self, batch: &[Entry]) {
         let mut station = self.station.write().expect("no holder panics");
-        take_into(&mut station, batch);
+        batch.iter().for_each(|entry| take_entry(&mut station, entry));
     }
 
-    fn settle_and_publish(&mut self) {
-        let changes = self.station.write().expect("no holder panics").settle();
+    /// Products of what was taken, and a new calibration where one is due.
+    fn bring_up(&mut self) {
+        let due = self.calibrated.is_none_or(|(when, took)| when.elapsed() >= took * CALIBRATION_PAUSES);
+        let changes = {
+            let mut station = self.station.write().expect("no holder panics");
+            if due && station.calibration_waits() {
+                let start = Instant::now();
+                let changes = station.settle();
+                self.calibrated = Some((Instant::now(), start.elapsed()));
+                changes
+            } else {
+                station.refresh()
+            }
+        };
         self.publish(changes);
         self.published = self.batch;
         self.flushed = false;
@@ -278,7 +305,9 @@ impl Writer {
     }
 
     fn flush(&mut self) {
+        let start = Instant::now();
         let changes = self.station.write().expect("no holder panics").flush();
+        self.calibrated = Some((Instant::now(), start.elapsed()));
         self.publish(changes);
         self.flushed = true;
         self.show();
@@ -296,19 +325,29 @@ impl Writer {
 
     /// Two good frames of one identity differ, and the one in use lost the vote: the log is taken again without it.
     fn set_frames_aside(&mut self) -> Result<(), StoreError> {
-        let station = self.station.read().expect("no holder panics");
-        let Some(set_aside) = station.to_set_aside() else { return Ok(()) };
-        let mut anew = Station::without(station.settings().clone(), None, set_aside);
+        let mut station = self.station.write().expect("no holder panics");
+        if !set_aside(&self.log, &mut station, |_, _, _| {})? {
+            return Ok(());
+        }
+        let changes = station.settle();
+        station.announce_raw(true);
         drop(station);
-        tracing::warn!("good frames of one identity differ; the log is taken again with the ones seen more often");
-        self.log.replay(|_, batch| take_into(&mut anew, &batch))?;
-        let mut changes = anew.settle();
-        // All else was told before; a window is told again only where its revision is another one.
-        changes.retain(|change| matches!(change, Change::Window { .. } | Change::Calibration { .. }));
-        anew.announce_raw(true);
-        *self.station.write().expect("no holder panics") = anew;
-        self.publish(changes);
+        self.publish_untold(changes);
         Ok(())
+    }
+
+    /// Publishes what a station that has told nothing yet says, but for what was told before; a window is told again only where
+    /// its revision is another one.
+    fn publish_untold(&mut self, mut changes: Vec<Change>) {
+        let told = self.hub.told_texts();
+        {
+            let station = self.station.read().expect("no holder panics");
+            changes.retain(|change| match whole(&station, change) {
+                Some((topic, _, json)) => !told.contains(&(topic, json)),
+                None => true,
+            });
+        }
+        self.publish(changes);
     }
 
     /// Publishes changes, some at a time: a new calibration changes every window there is.
@@ -320,7 +359,7 @@ impl Writer {
                 let station = self.station.read().expect("no holder panics");
                 changes.by_ref().take(AT_ONCE).filter_map(|change| body(&self.hub, &station, change)).collect()
             };
-            self.publish_bodies(bodies);
+            self.unjournaled.extend(self.hub.publish(bodies));
         }
     }
 
@@ -328,14 +367,8 @@ impl Writer {
     fn publish_waiting(&mut self) {
         let waiting = self.hub.take_waiting();
         if !waiting.is_empty() {
-            self.publish_bodies(waiting);
+            self.unjournaled.extend(self.hub.publish(waiting));
         }
-    }
-
-    fn publish_bodies(&mut self, bodies: Vec<Body>) {
-        let journaled = self.hub.publish(bodies);
-        self.unjournaled.entries.extend(journaled.entries);
-        self.unjournaled.forgotten.extend(journaled.forgotten);
     }
 
     fn show(&self) {
@@ -350,42 +383,96 @@ impl Writer {
 /// When the log cannot be read.
 pub fn rebuild(log: &RawLog, settings: &Settings) -> Result<Station, StoreError> {
     let mut station = Station::new(settings.clone(), None);
-    log.replay(|_, batch| take_into(&mut station, &batch))?;
-    if let Some(set_aside) = station.to_set_aside() {
-        station = Station::without(settings.clone(), None, set_aside);
-        log.replay(|_, batch| take_into(&mut station, &batch))?;
-    }
+    take_log(log, &mut station, |_, _, _| {})?;
     station.flush();
     Ok(station)
 }
 
-fn take_into(station: &mut Station, batch: &[Entry]) {
-    for entry in batch {
-        match entry {
-            Entry::Opened { playback } => station.open_playback(PlaybackId(*playback)),
-            Entry::Arrival { playback, arrival } => station.take(PlaybackId(*playback), arrival),
-            Entry::Closed { playback, bits } => station.close_playback(PlaybackId(*playback), *bits),
+/// A new station takes a whole log, a second time where frames lost a vote; `note` is called with every batch it took.
+fn take_log(
+    log: &RawLog,
+    station: &mut Station,
+    mut note: impl FnMut(&mut Station, u64, &[Stored]),
+) -> Result<(), StoreError> {
+    take_once(log, station, &mut note)?;
+    set_aside(log, station, note).map(|_| ())
+}
+
+/// Takes the log again where good frames of one identity differ and one in use lost the vote; whether that was so.
+fn set_aside(
+    log: &RawLog,
+    station: &mut Station,
+    mut note: impl FnMut(&mut Station, u64, &[Stored]),
+) -> Result<bool, StoreError> {
+    let Some(set_aside) = station.to_set_aside() else { return Ok(false) };
+    tracing::warn!("good frames of one identity differ; the log is taken again with the ones seen more often");
+    *station = Station::without(station.settings().clone(), None, set_aside);
+    take_once(log, station, &mut note)?;
+    Ok(true)
+}
+
+fn take_once(
+    log: &RawLog,
+    station: &mut Station,
+    note: &mut impl FnMut(&mut Station, u64, &[Stored]),
+) -> Result<(), StoreError> {
+    log.replay(|number, batch| {
+        for stored in &batch {
+            take_stored(log, station, stored)?;
         }
+        note(station, number, &batch);
+        Ok(())
+    })
+}
+
+/// The octets of a repeat are read again only where the station cannot do without.
+fn take_stored(log: &RawLog, station: &mut Station, stored: &Stored) -> Result<(), StoreError> {
+    match stored {
+        Stored::Entry(entry, _) => take_entry(station, entry),
+        Stored::Repeat { playback, arrival, place } => {
+            let playback = PlaybackId(*playback);
+            if !station.take_repeat(playback, arrival) {
+                station.take(playback, &log.resolve(arrival.clone(), *place)?);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn take_entry(station: &mut Station, entry: &Entry) {
+    match entry {
+        Entry::Opened { playback } => station.open_playback(PlaybackId(*playback)),
+        Entry::Arrival { playback, arrival } => station.take(PlaybackId(*playback), arrival),
+        Entry::Closed { playback, bits } => station.close_playback(PlaybackId(*playback), *bits),
     }
 }
 
 /// What a change says to readers; `None` when they know.
 fn body(hub: &Hub, station: &Station, change: Change) -> Option<Body> {
-    let mission = station.settings().time;
-    let told = |topic, clock, json| Some(Body::Told { topic, clock, json });
     match change {
         Change::Window { product, .. } => match hub.told_revision(product.start) {
             Some(revision) if revision == product.revision => None,
-            Some(revision) => Some(Body::Supersede(*product, Some(revision))),
-            None => Some(Body::Window(*product)),
+            Some(revision) => Some(Body::Supersede(product, Some(revision))),
+            None => Some(Body::Window(product)),
         },
         Change::Raw(record) => Some(Body::Second(record)),
-        Change::Gap { from, to } => told(Topic::Window, from, members("gap", &Gap::new(&mission, from, to))),
-        Change::Event(event) => told(Topic::Event, event.clock, members("event", &EventWire::new(&mission, &event))),
-        Change::Anomaly(anomaly) => told(Topic::Anomaly, anomaly.from, members("anomaly", &AnomalyWire::new(&anomaly))),
+        change => whole(station, &change).map(|(topic, clock, json)| Body::Told { topic, clock, json }),
+    }
+}
+
+/// What is told whole of a change: its topic, the clock it is about, its JSON members.
+fn whole(station: &Station, change: &Change) -> Option<(Topic, Clock, String)> {
+    let mission = station.settings().time;
+    match change {
+        Change::Window { .. } | Change::Raw(_) => None,
+        Change::Gap { from, to } => Some((Topic::Window, *from, members("gap", &Gap::new(&mission, *from, *to)))),
+        Change::Event(event) => Some((Topic::Event, event.clock, members("event", &EventWire::new(&mission, event)))),
+        Change::Anomaly(anomaly) => {
+            Some((Topic::Anomaly, anomaly.from, members("anomaly", &AnomalyWire::new(&mission, anomaly))))
+        }
         Change::Calibration { known_since, .. } => {
             let json = station.calibration().map(version_json)?;
-            told(Topic::Calibration, known_since, members("calibration", &json))
+            Some((Topic::Calibration, *known_since, members("calibration", &json)))
         }
     }
 }
@@ -412,6 +499,7 @@ fn picture(station: &Station) -> Picture {
         calibration: station.calibration().map_or(0, |calibration| calibration.version),
         events: station.events().count() as u64,
         anomalies: station.derived().anomalies.len() as u64,
+        settled: station.is_settled(),
     }
 }
 
@@ -422,22 +510,46 @@ fn next_playback(entry: &Entry) -> u32 {
     }
 }
 
-/// Keeps the playbacks that a crash left open: from which bit of their stream to which.
-fn note_open(open: &mut HashMap<u32, (u64, u64)>, entry: &Entry) {
-    match entry {
-        Entry::Opened { playback } => {
-            open.insert(*playback, (0, 0));
-        }
-        Entry::Closed { playback, .. } => {
-            open.remove(playback);
-        }
-        Entry::Arrival { playback, arrival } => {
-            let end_bit = arrival.first_bit + arrival.octets.len() as u64 * 8;
-            let span = open.entry(*playback).or_insert((arrival.first_bit, end_bit));
-            if *span == (0, 0) {
-                *span = (arrival.first_bit, end_bit);
+/// Playbacks that a crash left open: from which bit of their stream to which.
+struct Orphans {
+    frame_octets: usize,
+    open: HashMap<u32, (u64, u64)>,
+    next_playback: u32,
+}
+
+impl Orphans {
+    fn note(&mut self, stored: &Stored) {
+        match stored {
+            Stored::Entry(Entry::Opened { playback }, _) => {
+                self.next_playback = self.next_playback.max(playback + 1);
+                self.open.insert(*playback, (0, 0));
             }
-            span.1 = span.1.max(end_bit);
+            Stored::Entry(Entry::Closed { playback, .. }, _) => {
+                self.open.remove(playback);
+            }
+            Stored::Entry(Entry::Arrival { playback, arrival }, _) => {
+                self.note_arrival(*playback, arrival.first_bit, arrival.octets.len());
+            }
+            Stored::Repeat { playback, arrival, .. } => {
+                self.note_arrival(*playback, arrival.first_bit, self.frame_octets);
+            }
         }
+    }
+
+    fn note_arrival(&mut self, playback: u32, first_bit: u64, octets: usize) {
+        let end_bit = first_bit + octets as u64 * 8;
+        let span = self.open.entry(playback).or_insert((first_bit, end_bit));
+        if *span == (0, 0) {
+            *span = (first_bit, end_bit);
+        }
+        span.1 = span.1.max(end_bit);
+    }
+
+    /// The ends of these playbacks, as far as their bits are known.
+    fn closing(self) -> Vec<Entry> {
+        let closed = |(playback, (from_bit, to_bit))| Entry::Closed { playback, bits: to_bit - from_bit };
+        let mut closing: Vec<Entry> = self.open.into_iter().map(closed).collect();
+        closing.sort_by_key(next_playback);
+        closing
     }
 }

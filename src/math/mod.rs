@@ -1,3 +1,4 @@
 //! Robust means, least squares, rotation, spectra and evidence, on slices and matrices only.
 
+pub mod ranked;
 pub mod robust;

@@ -1,4 +1,6 @@
-//! Hogg's adaptive trimmed mean on sorted counts, in exact integer sums until the last division.
+//! Hogg's adaptive trimmed mean on ranked counts, in exact integer sums until the last division.
+
+use super::ranked::{Border, Pair, Ranked};
 
 /// The law from the tail statistic Q to the trim fraction per end.
 ///
@@ -71,139 +73,79 @@ impl TrimmedMean {
     }
 }
 
-/// Sum of a slice of counts. Within a chunk it fits 32 bits, in which the machine adds many at a time.
-fn sum(counts: &[i16]) -> i64 {
-    counts.chunks(1 << 15).map(|chunk| i64::from(chunk.iter().map(|count| i32::from(*count)).sum::<i32>())).sum()
-}
-
-/// Sum of squares of a slice of counts; four of them fit 32 unsigned bits.
-fn sum_of_squares(counts: &[i16]) -> i64 {
-    let square = |count: &i16| i32::from(*count).unsigned_abs().pow(2);
-    counts.chunks(4).map(|chunk| i64::from(chunk.iter().map(square).sum::<u32>())).sum()
-}
-
-/// Q of sorted counts; None when the inner half-means are equal.
-pub fn tail_statistic(sorted: &[i16]) -> Option<f64> {
+/// Q of counts; None when the inner half-means are equal.
+pub fn tail_statistic(counts: Pair<'_>) -> Option<f64> {
+    let all = counts.len();
+    let total = counts.sums(counts.border(all)).counts;
     let spread = |fraction: f64| {
-        let points = points_of_fraction(fraction, sorted.len()).max(1);
-        let (smallest, largest) = (&sorted[..points], &sorted[sorted.len() - points..]);
-        (sum(largest) - sum(smallest)) as f64 / points as f64
+        let points = points_of_fraction(fraction, all).max(1);
+        let smallest = counts.sums(counts.border(points)).counts;
+        let largest = total - counts.sums(counts.border(all - points)).counts;
+        (largest - smallest) as f64 / points as f64
     };
     let inner = spread(0.5);
     (inner > 0.0).then(|| spread(0.2) / inner)
 }
 
-/// The adaptive trimmed mean of counts in ascending order; None of none.
-pub fn trimmed_mean(sorted: &[i16], law: &TrimLaw) -> Option<TrimmedMean> {
-    let points = sorted.len();
-    if points == 0 {
+/// The adaptive trimmed mean of two runs of counts taken together; None of none.
+pub fn trimmed_mean(counts: Pair<'_>, law: &TrimLaw) -> Option<TrimmedMean> {
+    if counts.is_empty() {
         return None;
     }
-    let q = tail_statistic(sorted);
+    let points = counts.len();
+    let q = tail_statistic(counts);
     let trim = law.fraction(q);
     let dropped = points_of_fraction(trim, points).min((points - 1) / 2);
-    let kept = &sorted[dropped..points - dropped];
-    let (mean, deviation) = mean_and_deviation(kept);
+    let (from, to) = (counts.border(dropped), counts.border(points - dropped));
+    let (mean, deviation) = mean_and_deviation(counts, from, to);
     Some(TrimmedMean {
         points,
         q,
         trim,
-        kept: kept.len(),
+        kept: points - 2 * dropped,
         mean,
         deviation,
-        plain_mean: sum(sorted) as f64 / points as f64,
-        winsorised_sd: winsorised_sd(kept, dropped),
+        plain_mean: counts.sums(counts.border(points)).counts as f64 / points as f64,
+        winsorised_sd: winsorised_sd(counts, from, to, dropped),
     })
 }
 
-/// The estimator that flew: it drops one point more at the high end of counts. Mean, average deviation and points kept.
-pub fn flight_trimmed_mean(sorted: &[i16], law: &TrimLaw) -> Option<(f64, f64, usize)> {
-    let dropped = points_of_fraction(law.fraction(tail_statistic(sorted)), sorted.len());
-    let kept = sorted.get(dropped..sorted.len().checked_sub(dropped + 1)?)?;
-    let (mean, deviation) = mean_and_deviation(kept);
-    (!kept.is_empty()).then_some((mean, deviation, kept.len()))
+/// The adaptive trimmed mean of counts in any order; None of none.
+pub fn trimmed_mean_of(counts: Vec<i16>, law: &TrimLaw) -> Option<TrimmedMean> {
+    trimmed_mean(Pair([&Ranked::of(counts), &Ranked::default()]), law)
 }
 
-/// Mean and average absolute deviation from it, of counts in ascending order.
-fn mean_and_deviation(sorted: &[i16]) -> (f64, f64) {
-    let (points, total) = (sorted.len() as f64, sum(sorted));
+/// The estimator that flew: it drops one point more at the high end of counts. Mean, average deviation and points kept.
+pub fn flight_trimmed_mean(counts: Pair<'_>, law: &TrimLaw) -> Option<(f64, f64, usize)> {
+    let dropped = points_of_fraction(law.fraction(tail_statistic(counts)), counts.len());
+    let end = counts.len().checked_sub(dropped + 1).filter(|end| *end > dropped)?;
+    let (mean, deviation) = mean_and_deviation(counts, counts.border(dropped), counts.border(end));
+    Some((mean, deviation, end - dropped))
+}
+
+/// Mean and average absolute deviation from it, of the counts between two borders.
+fn mean_and_deviation(counts: Pair<'_>, from: Border, to: Border) -> (f64, f64) {
+    let before = counts.sums(from).counts;
+    let total = counts.sums(to).counts - before;
+    let points = (to.points() - from.points()) as f64;
     let mean = total as f64 / points;
-    let below = sorted.partition_point(|count| f64::from(*count) < mean);
-    let total_below = sum(&sorted[..below]);
-    let (points_below, points_above) = (below as f64, points - below as f64);
+    let middle = counts.border_at(mean, from, to);
+    let total_below = counts.sums(middle).counts - before;
+    let points_below = (middle.points() - from.points()) as f64;
+    let points_above = points - points_below;
     let absolute = mean * points_below - total_below as f64 + (total - total_below) as f64 - mean * points_above;
     (mean, absolute / points)
 }
 
-/// Standard deviation with `dropped` points at either end moved to the nearest kept one.
-fn winsorised_sd(kept: &[i16], dropped: usize) -> f64 {
-    let points = (kept.len() + 2 * dropped) as i64;
-    if points < 2 {
-        return 0.0;
-    }
-    let ends = [i64::from(kept[0]), i64::from(kept[kept.len() - 1])];
-    let of_ends = |power: u32| dropped as i64 * (ends[0].pow(power) + ends[1].pow(power));
-    let total = sum(kept) + of_ends(1);
-    let squares = sum_of_squares(kept) + of_ends(2);
+/// Standard deviation with the `dropped` points beyond either border moved to the nearest kept one.
+fn winsorised_sd(counts: Pair<'_>, from: Border, to: Border, dropped: usize) -> f64 {
+    let points = (to.points() - from.points() + 2 * dropped) as i64;
+    let Some(ends) = counts.ends(from, to).filter(|_| points > 1) else { return 0.0 };
+    let of_ends = |power: u32| dropped as i64 * (i64::from(ends[0]).pow(power) + i64::from(ends[1]).pow(power));
+    let kept = counts.sums(to) - counts.sums(from);
+    let (total, squares) = (kept.counts + of_ends(1), kept.squares + of_ends(2));
     let scatter = i128::from(points) * i128::from(squares) - i128::from(total) * i128::from(total);
     (scatter as f64 / (points as f64 * (points - 1) as f64)).sqrt()
-}
-
-/// Merges two ascending slices.
-pub fn merge(left: &[i16], right: &[i16], merged: &mut Vec<i16>) {
-    merged.clear();
-    merged.resize(left.len() + right.len(), 0);
-    let (mut i, mut j) = (0, 0);
-    let mut places = merged.iter_mut();
-    // Whose count comes next is a coin toss: no branch may depend on it.
-    while i < left.len() && j < right.len() {
-        let (a, b) = (left[i], right[j]);
-        let Some(place) = places.next() else { return };
-        *place = a.min(b);
-        let take_left = usize::from(a <= b);
-        i += take_left;
-        j += 1 - take_left;
-    }
-    places.zip(left[i..].iter().chain(&right[j..])).for_each(|(place, count)| *place = *count);
-}
-
-/// Most counts that one radix sort takes; more are left to the standard sort.
-const RADIX_COUNTS_MAX: usize = 256;
-
-/// Sorts counts in ascending order: a radix sort of two passes of eight bits, a pass left out when its digit is the same
-/// throughout.
-pub fn sort_counts(counts: &mut [i16]) {
-    let points = counts.len();
-    if !(2..=RADIX_COUNTS_MAX).contains(&points) {
-        return counts.sort_unstable();
-    }
-    let mut keys = [0u16; RADIX_COUNTS_MAX];
-    let mut sorted = [0u16; RADIX_COUNTS_MAX];
-    let mut places = [[0u16; 256]; 2];
-    for (key, count) in keys.iter_mut().zip(counts.iter()) {
-        *key = (*count as u16) ^ 0x8000;
-        let [low, high] = key.to_le_bytes();
-        places[0][usize::from(low)] += 1;
-        places[1][usize::from(high)] += 1;
-    }
-    for (digit, places) in places.iter_mut().enumerate() {
-        let digit_of = |key: u16| usize::from((key >> (8 * digit)) as u8);
-        if usize::from(places[digit_of(keys[0])]) == points {
-            continue;
-        }
-        let mut next = 0;
-        for place in places.iter_mut() {
-            next += std::mem::replace(place, next);
-        }
-        for key in &keys[..points] {
-            let place = &mut places[digit_of(*key)];
-            // Places never exceed the number of points: the mask only spares the check.
-            sorted[usize::from(*place) % RADIX_COUNTS_MAX] = *key;
-            *place += 1;
-        }
-        std::mem::swap(&mut keys, &mut sorted);
-    }
-    counts.iter_mut().zip(keys).for_each(|(count, key)| *count = (key ^ 0x8000) as i16);
 }
 
 /// Median of a slice, which is reordered; None of none. For an even number the mean of the two inner points.
@@ -222,9 +164,13 @@ mod tests {
     use proptest::prelude::*;
     use rand::{RngExt, SeedableRng};
 
+    fn q_of(counts: Vec<i16>) -> Option<f64> {
+        tail_statistic(Pair([&Ranked::of(counts), &Ranked::default()]))
+    }
+
     fn naive(sorted: &[i16], law: &TrimLaw) -> (f64, f64) {
         let n = sorted.len();
-        let k = (law.fraction(tail_statistic(sorted)) * n as f64 + 1e-9).floor() as usize;
+        let k = (law.fraction(q_of(sorted.to_vec())) * n as f64 + 1e-9).floor() as usize;
         let kept: Vec<f64> = sorted[k..n - k].iter().map(|c| f64::from(*c)).collect();
         let mean = kept.iter().sum::<f64>() / kept.len() as f64;
         (mean, kept.iter().map(|x| (x - mean).abs()).sum::<f64>() / kept.len() as f64)
@@ -233,13 +179,11 @@ mod tests {
     #[test]
     fn a_normal_sample_has_q_1_754_and_a_laplace_sample_1_916() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-        let mut q_of = |draw: &dyn Fn(f64, f64) -> f64| {
-            let mut counts: Vec<i16> = (0..400_000).map(|_| draw(rng.random(), rng.random()).round() as i16).collect();
-            counts.sort_unstable();
-            tail_statistic(&counts).unwrap()
+        let mut q_drawn = |draw: &dyn Fn(f64, f64) -> f64| {
+            q_of((0..400_000).map(|_| draw(rng.random(), rng.random()).round() as i16).collect()).unwrap()
         };
-        let normal = q_of(&|u, v| 1000.0 * (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos());
-        let laplace = q_of(&|u, v| 1000.0 * (1.0 - u).ln() * if v < 0.5 { 1.0 } else { -1.0 });
+        let normal = q_drawn(&|u, v| 1000.0 * (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos());
+        let laplace = q_drawn(&|u, v| 1000.0 * (1.0 - u).ln() * if v < 0.5 { 1.0 } else { -1.0 });
         // Four standard errors at 400,000 points are below 0.006.
         assert!((normal - 1.754).abs() < 0.006, "{normal}");
         assert!((laplace - 1.916).abs() < 0.006, "{laplace}");
@@ -256,7 +200,7 @@ mod tests {
 
     #[test]
     fn a_constant_window_has_no_q_and_the_smallest_trim() {
-        let mean = trimmed_mean(&[7; 500], &TrimLaw::default()).unwrap();
+        let mean = trimmed_mean_of(vec![7; 500], &TrimLaw::default()).unwrap();
         assert_eq!((mean.q, mean.trim, mean.kept), (None, 0.05, 450));
         assert_eq!((mean.mean, mean.deviation, mean.winsorised_sd), (7.0, 0.0, 0.0));
     }
@@ -266,8 +210,10 @@ mod tests {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
         let mut counts: Vec<i16> = (0..500).map(|_| rng.random_range(-3000..3000)).collect();
         counts.sort_unstable();
-        let right = trimmed_mean(&counts, &TrimLaw::default()).unwrap();
-        let (flight, _, kept) = flight_trimmed_mean(&counts, &TrimLaw::default()).unwrap();
+        let right = trimmed_mean_of(counts.clone(), &TrimLaw::default()).unwrap();
+        let ranked = Ranked::of(counts.clone());
+        let pair = Pair([&ranked, &Ranked::default()]);
+        let (flight, _, kept) = flight_trimmed_mean(pair, &TrimLaw::default()).unwrap();
         let dropped = (500 - right.kept) / 2;
         let highest_kept = f64::from(counts[500 - dropped - 1]);
         assert_eq!(kept, right.kept - 1);
@@ -277,35 +223,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn sums_by_parts_equal_the_naive_ones(mut counts in prop::collection::vec(-32767i16..=32767, 1..600)) {
-            counts.sort_unstable();
+        fn sums_by_parts_equal_the_naive_ones(mut counts in prop::collection::vec(-32767i16..=32767, 1..600), cut in 0usize..600) {
             let law = TrimLaw::default();
-            let mean = trimmed_mean(&counts, &law).unwrap();
+            let (first, second) = counts.split_at(cut.min(counts.len()));
+            let halves = [Ranked::of(first.to_vec()), Ranked::of(second.to_vec())];
+            let mean = trimmed_mean(Pair([&halves[0], &halves[1]]), &law).unwrap();
+            prop_assert_eq!(Some(mean), trimmed_mean_of(counts.clone(), &law), "however they are cut in two");
+            counts.sort_unstable();
             let (expected, deviation) = naive(&counts, &law);
             prop_assert!((mean.mean - expected).abs() < 1e-6);
             prop_assert!((mean.deviation - deviation).abs() < 1e-6);
-        }
-
-        #[test]
-        fn a_radix_sort_sorts(mut counts in prop::collection::vec(any::<i16>(), 0..400), narrow in any::<bool>()) {
-            if narrow {
-                counts.iter_mut().for_each(|count| *count = *count % 100 - 50);
-            }
-            let mut expected = counts.clone();
-            expected.sort_unstable();
-            sort_counts(&mut counts);
-            prop_assert_eq!(counts, expected);
-        }
-
-        #[test]
-        fn a_merge_is_the_sort_of_both(mut a in prop::collection::vec(any::<i16>(), 0..300), mut b in prop::collection::vec(any::<i16>(), 0..300)) {
-            a.sort_unstable();
-            b.sort_unstable();
-            let mut merged = Vec::new();
-            merge(&a, &b, &mut merged);
-            let mut both = [a, b].concat();
-            both.sort_unstable();
-            prop_assert_eq!(merged, both);
         }
     }
 }

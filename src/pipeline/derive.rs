@@ -1,6 +1,6 @@
 //! A window and a calibration make a product.
 
-use sha2::{Digest, Sha256};
+use rapidhash::v3::rapidhash_v3;
 
 use super::axes::{OareVector, errors_to_body, to_body};
 use super::calibration::{Calibrated, Calibration, Measured, RangeCorrection};
@@ -101,15 +101,13 @@ fn in_body_axes(axes: [Calibrated; 3]) -> BodyAcceleration {
 
 /// Hash of the samples and of every figure they were turned into.
 fn revision(window: &Window, product: &Product) -> Revision {
-    let mut digest = Sha256::new_with_prefix(window.digest);
-    digest.update(product.calibration.to_le_bytes());
+    let mut octets = Vec::with_capacity(128);
+    octets.extend(window.hash.to_le_bytes());
+    octets.extend(product.calibration.to_le_bytes());
     if let Some(acceleration) = &product.acceleration {
         let vectors = [acceleration.trimmed_ng, acceleration.mean_ng, acceleration.sigma_ng, acceleration.sigma_sys_ng];
-        vectors.iter().flat_map(|vector| vector.0).for_each(|figure| digest.update(figure.to_le_bytes()));
+        octets.extend(vectors.iter().flat_map(|vector| vector.0).flat_map(f64::to_le_bytes));
     }
-    digest.update(product.range.map(|range| range.map_or(3, |range| range.index() as u8)));
-    let octets: [u8; 32] = digest.finalize().into();
-    Revision(u64::from_be_bytes([
-        octets[0], octets[1], octets[2], octets[3], octets[4], octets[5], octets[6], octets[7],
-    ]))
+    octets.extend(product.range.map(|range| range.map_or(3, |range| range.index() as u8)));
+    Revision(rapidhash_v3(&octets))
 }

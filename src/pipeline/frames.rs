@@ -54,8 +54,7 @@ impl FrameSet {
     /// Adds a good frame of a playback. Gives what it is to the set, and whether its packets are to be used.
     pub fn add(&mut self, playback: PlaybackId, id: FrameId, octets: &[u8]) -> (Novelty, bool) {
         let digest: FrameDigest = Sha256::digest(octets).into();
-        let fingerprint = self.fingerprints.entry(playback).or_default();
-        *fingerprint = Sha256::new_with_prefix(*fingerprint).chain_update(digest).finalize().into();
+        self.note_in_fingerprint(playback, digest);
         let usable = !self.set_aside.contains(&(id, digest));
         let Some(first) = self.frames.get_mut(&id) else {
             self.frames.insert(id, Variant { digest, playbacks: vec![playback] });
@@ -88,6 +87,20 @@ impl FrameSet {
             }
             None => (Novelty::Conflicting, false),
         }
+    }
+
+    /// Adds a frame known to be one of those added before under its identity; false where there are several, or none.
+    pub fn add_repeat(&mut self, playback: PlaybackId, id: FrameId) -> bool {
+        let Some(only) = self.frames.get_mut(&id).filter(|_| !self.others.contains_key(&id)) else { return false };
+        note(&mut only.playbacks, playback);
+        let digest = only.digest;
+        self.note_in_fingerprint(playback, digest);
+        true
+    }
+
+    fn note_in_fingerprint(&mut self, playback: PlaybackId, digest: FrameDigest) {
+        let fingerprint = self.fingerprints.entry(playback).or_default();
+        *fingerprint = Sha256::new_with_prefix(*fingerprint).chain_update(digest).finalize().into();
     }
 
     /// Distinct identities.

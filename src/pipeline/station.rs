@@ -1,6 +1,7 @@
 //! The pipeline as one state machine: frames in, changes out, products at any time.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use super::archive::{Addition, Archive, cell_of};
 use super::calibration::{self, Anomaly, Calibration, Derived, KnownCalibration};
@@ -23,7 +24,7 @@ pub enum Change {
     /// A window's product, and the revision it takes the place of.
     Window {
         /// The product.
-        product: Box<Product>,
+        product: Arc<Product>,
         /// The revision announced before, if any.
         supersedes: Option<Revision>,
     },
@@ -59,7 +60,8 @@ pub struct Station {
     ledger: Ledger,
     derived: Derived,
     windows: BTreeMap<i64, Window>,
-    products: BTreeMap<i64, Product>,
+    /// Shared with those who are told of them.
+    products: BTreeMap<i64, Arc<Product>>,
     /// Cells with new samples.
     touched: BTreeSet<i64>,
     /// Whether anything that calibration depends on is new.
@@ -112,6 +114,11 @@ impl Station {
         self.announces_raw = wanted;
     }
 
+    /// Drops the changes that wait to be told.
+    pub fn forget_changes(&mut self) {
+        self.waiting.clear();
+    }
+
     /// A playback starts. Numbers are the caller's, in order of arrival.
     pub fn open_playback(&mut self, id: PlaybackId) {
         self.ledger.playback_mut(id);
@@ -148,6 +155,21 @@ impl Station {
         if usable && let Ok(frame) = TransferFrame::read(&self.settings.link, &arrival.octets) {
             self.read_packets(id, &frame);
         }
+    }
+
+    /// As [`Station::take`], for a good frame known to be a repeat of one taken before, of which only the identity is at hand; false,
+    /// and nothing taken, where that does not tell which frame it is.
+    pub fn take_repeat(&mut self, id: PlaybackId, arrival: &Arrival) -> bool {
+        let Verdict::Good(frame) = arrival.verdict else { return false };
+        if !self.frames.add_repeat(id, frame) {
+            return false;
+        }
+        let playback = self.ledger.playback_mut(id);
+        playback.account.frames_found += 1;
+        playback.account.frames_repeated += 1;
+        playback.sense.get_or_insert(arrival.sense);
+        playback.bit_offset.get_or_insert((arrival.first_bit % 8) as u8);
+        true
     }
 
     fn read_packets(&mut self, id: PlaybackId, frame: &TransferFrame<'_>) {
@@ -220,8 +242,28 @@ impl Station {
     /// Brings windows, calibration and products up to date with the frames taken, and tells what changed. A window that is
     /// not whole is announced when nothing more came for it since the last time.
     pub fn settle(&mut self) -> Vec<Change> {
+        self.bring_up(true)
+    }
+
+    /// As [`Station::settle`], with the calibration as it is: while much is coming, deriving it from everything time and again would
+    /// cost more than all the rest. It catches up with the next `settle`.
+    pub fn refresh(&mut self) -> Vec<Change> {
+        self.bring_up(false)
+    }
+
+    /// Whether telemetry came that the calibration in use does not know yet.
+    pub fn calibration_waits(&self) -> bool {
+        self.calibration_touched
+    }
+
+    /// Whether everything taken is in the products and was told.
+    pub fn is_settled(&self) -> bool {
+        self.touched.is_empty() && self.unannounced.is_empty() && !self.calibration_touched && !self.checks_touched
+    }
+
+    fn bring_up(&mut self, calibrating: bool) -> Vec<Change> {
         let touched = self.recompute_windows();
-        let calibration_changed = self.recompute_calibration();
+        let calibration_changed = calibrating && self.recompute_calibration();
         if calibration_changed {
             let all: Vec<i64> = self.windows.keys().copied().collect();
             self.recompute_products(all);
@@ -290,18 +332,20 @@ impl Station {
             if self.announced.get(&cell) != Some(&product.revision) {
                 self.unannounced.insert(cell);
             }
-            self.products.insert(cell, product);
+            self.products.insert(cell, Arc::new(product));
         }
     }
 
     fn announce(&mut self, cells: Vec<i64>) -> Vec<Change> {
         let mut changes = std::mem::take(&mut self.waiting);
+        // Seconds in order of time, whichever way the tape ran: whoever keeps note of them needs one entry a run.
+        changes.sort_by_key(|change| if let Change::Raw(record) = change { Some(record.clock) } else { None });
         for cell in cells {
             self.unannounced.remove(&cell);
             let Some(product) = self.products.get(&cell) else { continue };
             let supersedes = self.announced.insert(cell, product.revision);
             if supersedes != Some(product.revision) {
-                changes.push(Change::Window { product: Box::new(*product), supersedes });
+                changes.push(Change::Window { product: product.clone(), supersedes });
             }
         }
         changes
@@ -334,7 +378,12 @@ impl Station {
 
     /// Products in order of their windows.
     pub fn products(&self) -> impl DoubleEndedIterator<Item = &Product> {
-        self.products.values()
+        self.products.values().map(Arc::as_ref)
+    }
+
+    /// The product of a window.
+    pub fn product(&self, start: Clock) -> Option<&Arc<Product>> {
+        self.products.get(&cell_of(start)).filter(|product| product.start == start)
     }
 
     /// Products of windows that start in `[from, to)`, in order.
@@ -345,12 +394,12 @@ impl Station {
         } else {
             0..0
         };
-        self.products.range(cells).map(|(_, product)| product)
+        self.products.range(cells).map(|(_, product)| product.as_ref())
     }
 
     /// The latest product with an acceleration.
     pub fn latest(&self) -> Option<&Product> {
-        self.products.values().rev().find(|product| product.acceleration.is_some())
+        self.products().rev().find(|product| product.acceleration.is_some())
     }
 
     /// The uncalibrated windows, in order.

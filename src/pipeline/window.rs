@@ -1,13 +1,14 @@
 //! The uncalibrated window: 50 s of counts, per axis the adaptive trimmed mean and its figures, in the range reported.
 //!
-//! Two sorted halves of 25 s merge into a window, so that each half is sorted once. Samples at the rail, and samples taken
+//! Two sorted halves of 25 s make a window, so that each half is sorted once. Samples at the rail, and samples taken
 //! while the table was not in its normal position, enter no estimate.
 
-use sha2::{Digest, Sha256};
+use rapidhash::v3::rapidhash_v3;
 
 use super::archive::{Archive, CELL_TENTHS};
 use super::settings::WindowPolicy;
-use crate::math::robust::{TrimmedMean, merge, sort_counts, trimmed_mean};
+use crate::math::ranked::{Pair, Ranked};
+use crate::math::robust::{TrimmedMean, trimmed_mean};
 use crate::telemetry::{AccRecord, Mode, Quality, Range, SAMPLES_PER_RECORD};
 use crate::units::Clock;
 
@@ -19,8 +20,8 @@ pub const WINDOW_TENTHS: i64 = 2 * CELL_TENTHS;
 /// The sorted samples of one half window.
 #[derive(Debug, Clone, Default)]
 pub struct HalfWindow {
-    /// Usable counts in ascending order, per axis and range.
-    sorted: [[Vec<i16>; 3]; 3],
+    /// Usable counts, per axis and range.
+    ranked: [[Ranked; 3]; 3],
     /// Samples that came down.
     present: u16,
     /// Of those, samples taken out of normal mode.
@@ -31,51 +32,59 @@ pub struct HalfWindow {
     modes: [u16; 5],
     /// Sum of the records' temperatures, C, and their number.
     temperature: (f64, u16),
-    /// The latest record, and a digest of all.
+    /// The latest record, and a hash of all.
     latest: Option<Clock>,
-    digest: [u8; 32],
+    hash: u64,
 }
 
 impl HalfWindow {
     /// Sorts the records of one cell.
     pub fn of(records: &[AccRecord]) -> Self {
         let mut half = HalfWindow::default();
-        let mut digest = Sha256::new();
+        let mut counts: [[Vec<i16>; 3]; 3] = Default::default();
+        let mut hashed = Vec::with_capacity(records.len() * HASHED_OCTETS);
         for record in records {
-            half.add(record, &mut digest);
+            half.add(record, &mut counts);
+            hashed.extend(hashed_octets(record));
         }
-        half.sorted.as_flattened_mut().iter_mut().for_each(|counts| sort_counts(counts));
-        half.digest = digest.finalize().into();
+        half.ranked = counts.map(|by_range| by_range.map(Ranked::of));
+        half.hash = rapidhash_v3(&hashed);
         half
     }
 
-    fn add(&mut self, record: &AccRecord, digest: &mut Sha256) {
+    fn add(&mut self, record: &AccRecord, counts: &mut [[Vec<i16>; 3]; 3]) {
         self.present += SAMPLES_PER_RECORD as u16;
         self.modes[usize::from(record.mode.code())] += 1;
         self.temperature.0 += f64::from(record.temperature_c);
         self.temperature.1 += 1;
         self.latest = self.latest.max(Some(record.clock));
-        digest.update(digest_octets(record));
         if record.mode != Mode::Normal || record.table_moving {
             self.away += SAMPLES_PER_RECORD as u16;
             return;
         }
         let is_at_rail = |sample: &[i16; 3]| sample.iter().any(|count| AccRecord::is_at_rail(*count));
-        self.at_rail += record.counts.iter().filter(|sample| is_at_rail(sample)).count() as u16;
-        for (axis, by_range) in self.sorted.iter_mut().enumerate() {
+        let at_rail = record.counts.iter().filter(|sample| is_at_rail(sample)).count();
+        self.at_rail += at_rail as u16;
+        for (axis, by_range) in counts.iter_mut().enumerate() {
             let counts = &mut by_range[record.ranges[axis].index()];
             if counts.capacity() == 0 {
                 counts.reserve_exact(CELL_TENTHS as usize);
             }
             let axis_counts = record.counts.iter().map(|sample| sample[axis]);
-            counts.extend(axis_counts.filter(|count| !AccRecord::is_at_rail(*count)));
+            match at_rail {
+                0 => counts.extend(axis_counts),
+                _ => counts.extend(axis_counts.filter(|count| !AccRecord::is_at_rail(*count))),
+            }
         }
     }
 }
 
+/// Octets of a record that are hashed.
+const HASHED_OCTETS: usize = 17 + SAMPLES_PER_RECORD * 6;
+
 /// Everything of a record that a window is made from.
-fn digest_octets(record: &AccRecord) -> [u8; 17 + SAMPLES_PER_RECORD * 6] {
-    let mut octets = [0u8; 17 + SAMPLES_PER_RECORD * 6];
+fn hashed_octets(record: &AccRecord) -> [u8; HASHED_OCTETS] {
+    let mut octets = [0u8; HASHED_OCTETS];
     octets[..8].copy_from_slice(&record.clock.tenths().to_le_bytes());
     octets[8..12].copy_from_slice(&record.temperature_c.to_le_bytes());
     octets[12..14].copy_from_slice(&[record.mode.code(), u8::from(record.table_moving)]);
@@ -112,8 +121,8 @@ pub struct Window {
     pub quality: Quality,
     /// Instrument clock of the latest record used.
     pub known_since: Clock,
-    /// Digest of every record in it.
-    pub digest: [u8; 32],
+    /// Hash of every record in it.
+    pub hash: u64,
 }
 
 impl Window {
@@ -128,17 +137,16 @@ impl Window {
         let samples = total(|half| half.present);
         let known_since = halves[0].latest.max(halves[1].latest)?;
         let mut mixed = false;
-        let mut merged = Vec::with_capacity(WINDOW_SAMPLES);
         let axes = [0, 1, 2].map(|axis| {
-            let points = [0, 1, 2].map(|range| halves.map(|half| half.sorted[axis][range].len()).iter().sum::<usize>());
+            let points = [0, 1, 2].map(|range| halves.map(|half| half.ranked[axis][range].len()).iter().sum::<usize>());
             mixed |= points.iter().filter(|points| **points > 0).count() > 1;
             // The coarser of two equally frequent ranges: the reversed order makes it the last maximum.
             let range = [2, 1, 0].into_iter().max_by_key(|range| points[*range]).unwrap_or(0);
             if points[range] < policy.samples_min {
                 return None;
             }
-            merge(&halves[0].sorted[axis][range], &halves[1].sorted[axis][range], &mut merged);
-            let estimate = trimmed_mean(&merged, &policy.trim)?;
+            let counts = Pair(halves.map(|half| &half.ranked[axis][range]));
+            let estimate = trimmed_mean(counts, &policy.trim)?;
             Some(AxisWindow { range: Range::ALL[range], estimate })
         });
         let modes = [0, 1, 2, 3, 4].map(|code| halves[0].modes[code] + halves[1].modes[code]);
@@ -153,7 +161,7 @@ impl Window {
             .with_if(Quality::TABLE_MOVING, away > 0);
         let temperature_c = halves.map(|half| half.temperature.0).iter().sum::<f64>()
             / f64::from(halves.map(|half| half.temperature.1).iter().sum::<u16>());
-        let digest = Sha256::new().chain_update(halves[0].digest).chain_update(halves[1].digest).finalize().into();
+        let hash = rapidhash_v3([halves[0].hash.to_le_bytes(), halves[1].hash.to_le_bytes()].as_flattened());
         Some(Self {
             start: Clock::from_tenths(cell * CELL_TENTHS),
             axes,
@@ -162,7 +170,7 @@ impl Window {
             mode: mode.unwrap_or(Mode::Unknown),
             quality,
             known_since,
-            digest,
+            hash,
         })
     }
 }

@@ -11,7 +11,7 @@ use mcap::{McapResult, WriteOptions, Writer};
 
 use super::frame_time::frame_clock;
 use super::schema::{TOPICS, json_schema};
-use crate::hub::wire::message_members;
+use crate::hub::wire::passing_members;
 use crate::hub::{Body, Message, Topic};
 use crate::ingest::wire::{Arrival, LinkConfig, Verdict};
 use crate::pipeline::Settings;
@@ -104,10 +104,10 @@ impl<W: Write + Seek> Recording<W> {
             Body::Told { topic, clock, .. } => (channel_of(*topic), *clock),
         };
         let mission = self.mission;
-        let members = message_members(&mission, message);
+        let members = passing_members(&mission, message);
         let mut text = Vec::with_capacity(members.len() + 2);
         text.push(b'{');
-        text.extend_from_slice(members);
+        text.extend_from_slice(&members);
         text.push(b'}');
         self.write(channel, clock, &text)
     }

@@ -6,7 +6,8 @@ use serde::Deserialize;
 
 use super::RecordError;
 use super::mcap_file::FRAME_TOPIC;
-use crate::ingest::wire::coding::SYNC_MARKER;
+use crate::ingest::wire::LinkConfig;
+use crate::ingest::wire::coding::{SYNC_MARKER, encode};
 
 /// Whether octets begin as an MCAP file does.
 pub fn is_mcap(octets: &[u8]) -> bool {
@@ -24,11 +25,11 @@ struct FrameMessage<'a> {
 /// The frames of a recording as one forward dump: each behind a sync marker, refused ones too where they are whole. A recording cut
 /// off by a crash is read as far as it goes.
 ///
-/// The dump is free of channel coding; it is read with a link that has none.
+/// Frames stand in a recording without their channel coding; the dump has that of `link`.
 ///
 /// # Errors
 /// When the octets are no MCAP, or no recording of ours.
-pub fn dump(octets: &[u8]) -> Result<Vec<u8>, RecordError> {
+pub fn dump(octets: &[u8], link: &LinkConfig) -> Result<Vec<u8>, RecordError> {
     let options = enumset::EnumSet::only(mcap::read::Options::IgnoreEndMagic);
     let messages = mcap::MessageStream::new_with_options(octets, options).map_err(RecordError::Read)?;
     let mut dump = Vec::new();
@@ -50,7 +51,9 @@ pub fn dump(octets: &[u8]) -> Result<Vec<u8>, RecordError> {
         frames += 1;
         if frame.verdict != "truncated" {
             dump.extend(SYNC_MARKER.to_be_bytes());
-            dump.extend(octets);
+            // What could not be decoded is kept as it came.
+            let as_sent = if octets.len() == link.frame_octets { encode(link, &octets) } else { octets };
+            dump.extend(as_sent);
         }
     }
     if frames == 0 { Err(RecordError::NoFrames { expected: FRAME_TOPIC }) } else { Ok(dump) }

@@ -1,13 +1,19 @@
-//! Sixty concealed cases of all kinds, analysed blind: no aim of the acceptance table may be refuted by them.
+//! The table of nulls against the bootstrap; and sixty concealed cases of all kinds, analysed blind: no aim of the acceptance
+//! table may be refuted by them.
 //!
 //! A rate is refuted when its whole 95 % Wilson interval lies on the wrong side of its aim: sixty cases cannot prove 99 %,
 //! and they can show that it is not so.
 #![cfg(feature = "slow")]
 
 use indicatif::ProgressBar;
-use oare_ground::challenge::conceal::Kind;
+use oare_ground::challenge::conceal::{self, Kind};
 use oare_ground::challenge::engine::Engine;
 use oare_ground::challenge::{run, score, seal};
+use oare_ground::diagnose::Settings;
+use oare_ground::diagnose::analysis::Prepared;
+use oare_ground::diagnose::case::{Case, Header, Texts};
+use oare_ground::diagnose::null_table;
+use rayon::prelude::*;
 
 /// First seed; fixed, so that a failure names its case.
 const SEED: u64 = 9_000;
@@ -18,6 +24,43 @@ fn aim(text: &str) -> (f64, bool) {
     let number = number.trim().split([' ', '%']).next().unwrap_or("");
     let share: f64 = number.parse().unwrap_or_else(|_| panic!("no number in the aim `{text}`"));
     (share / 100.0, less)
+}
+
+/// The table of nulls beside the bootstrap it stands for: on records with nothing missing, the whole search run again on noise drawn
+/// from the fitted one must reach the statistic of a tabulated probability about as often as the table says.
+#[test]
+fn the_table_of_nulls_agrees_with_the_bootstrap() {
+    const REPLICATES: usize = 30;
+    let probabilities: Vec<f64> = [Kind::Clean, Kind::Slow, Kind::Clean, Kind::Slow]
+        .into_iter()
+        .zip(SEED..)
+        .flat_map(|(kind, seed)| {
+            let concealed = conceal::draw(kind, seed);
+            let text = |name: &str| concealed.files.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone());
+            let header = Header::parse(&text("case.toml").unwrap(), &[]).unwrap();
+            let files = header.files.clone();
+            let texts = Texts {
+                recording: text(&files.recording),
+                simulation: text(&files.simulation),
+                ancillary: text(&files.ancillary),
+                events: text(&files.events),
+            };
+            let case = Case::from_texts(header, &texts).unwrap();
+            let prepared = Prepared::new(&case, &Settings::default()).unwrap();
+            (0..REPLICATES)
+                .into_par_iter()
+                .map(|i| null_table::false_alarm_probability(prepared.replicate(i)))
+                .collect::<Vec<f64>>()
+        })
+        .collect();
+    for level in [0.5, 0.1, 0.03] {
+        let reached = probabilities.iter().filter(|p| **p <= level).count();
+        println!("table says {level}: {reached} of {} replicates", probabilities.len());
+        // More than four binomial standard deviations above what the table says would be alarms it does not own up to.
+        let n = probabilities.len() as f64;
+        let most = n * level + 4.0 * (n * level * (1.0 - level)).sqrt();
+        assert!((reached as f64) < most, "the table says {level}, {reached} of {n} replicates reach it");
+    }
 }
 
 #[test]

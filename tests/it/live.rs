@@ -94,6 +94,22 @@ async fn history_goes_over_into_live_without_a_hole_or_a_repeat() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn raw_samples_of_the_past_come_too_each_second_once() {
+    let running = start().await;
+    running.send(&dump(20_000, 900, 0)).await;
+    let head = running.wait_for_playbacks(1).await["live"]["head_seq"].as_u64().unwrap();
+    let topics = oare_ground::hub::Topics::from_words("raw,window").unwrap();
+    let mut live = running.live("from=20500&topics=raw,window").await;
+    let messages = live.through(running.service.hub.last_seq_on(topics, head)).await;
+    assert_chain(&messages);
+    let of_kind = |kind: &str| messages.iter().filter(|message| message["type"] == kind).count();
+    assert_eq!((of_kind("raw"), of_kind("window")), (400, 400 / 25));
+    let seconds = messages.iter().filter(|message| message["type"] == "raw");
+    let clocks: BTreeSet<i64> = seconds.map(|message| message["clock_s"].as_f64().unwrap() as i64).collect();
+    assert_eq!(clocks, (20_500..20_900).collect());
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_late_frame_supersedes_the_windows_it_touches_and_no_other() {
     let running = start().await;
     let whole = dump(20_000, 1000, 0);

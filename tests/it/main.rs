@@ -6,6 +6,7 @@ mod dashboard;
 mod diagnosis;
 mod layering;
 mod live;
+mod replay;
 mod samples;
 mod service_support;
 mod station;

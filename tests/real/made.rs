@@ -283,7 +283,9 @@ fn gaps_absent_and_wrong_positions_are_left_out_and_counted() {
     lines.retain(|line| {
         second += usize::from(line.starts_with("PG02"));
         third += usize::from(line.starts_with("PG03"));
-        !(line.starts_with("PG02") && second < 30) && !(line.starts_with("PG03") && third > 4)
+        let late = line.starts_with("PG02") && second < 30;
+        let gone = line.starts_with("PG03") && third > 4;
+        !late && !gone
     });
     let answer = made.diagnose_text(lines.join("\n"), &without("solar_radiation_pressure")).expect("an answer");
     assert_eq!(ids(&answer), ["solar_radiation_pressure"]);

@@ -103,9 +103,10 @@ pub fn derive(
     let material = Material { pairs: &pairs, scales: &scales, settings };
     let mut derived = Derived { scales: scales.iter().map(|s| (s.clone(), None)).collect(), ..Derived::default() };
     let ends = ends(&pairs, &scales);
+    let chain = chain(&holds);
     for (n, known_since) in ends.iter().enumerate() {
         let noise = history.at(*known_since, configured);
-        let signature = signature(&holds, &scales, *known_since, &noise, settings);
+        let signature = signature(&chain, &scales, *known_since, &noise, settings);
         let held = previous.filter(|p| p.signatures.get(n) == Some(&signature));
         derived.signatures.push(signature);
         let is_last = n + 1 == ends.len();
@@ -156,9 +157,27 @@ fn ends(pairs: &[two_position::Pair<'_, '_>], scales: &[ScaleSequence]) -> Vec<C
     ends
 }
 
+/// Hashes of the holds up to each, in order of time: every version looks at all that came before it.
+fn chain(holds: &[Hold<'_>]) -> Vec<(Clock, u64)> {
+    let mut hasher = DefaultHasher::new();
+    let mut octets = Vec::new();
+    let link = |hold: &Hold<'_>| {
+        octets.clear();
+        for record in &hold.records {
+            octets.extend(record.clock.tenths().to_le_bytes());
+            octets.extend(record.temperature_c.to_le_bytes());
+            octets.extend(record.ranges.map(|range| range.index() as u8));
+            octets.extend(record.counts.iter().flatten().flat_map(|count| count.to_le_bytes()));
+        }
+        hasher.write(&octets);
+        (hold.start(), hasher.finish())
+    };
+    holds.iter().map(link).collect()
+}
+
 /// Hash of everything a version is made from.
 fn signature(
-    holds: &[Hold<'_>],
+    chain: &[(Clock, u64)],
     scales: &[ScaleSequence],
     known_since: Clock,
     noise: &NoiseFactors,
@@ -166,11 +185,8 @@ fn signature(
 ) -> u64 {
     let mut hasher = DefaultHasher::new();
     known_since.hash(&mut hasher);
-    for hold in holds.iter().filter(|hold| hold.start() <= known_since) {
-        for record in &hold.records {
-            (record.clock, &record.counts, record.temperature_c.to_bits(), record.ranges).hash(&mut hasher);
-        }
-    }
+    let holds = chain.partition_point(|(start, _)| *start <= known_since);
+    chain[..holds].last().hash(&mut hasher);
     for scale in scales.iter().filter(|scale| scale.span[1] <= known_since) {
         scale.rate_rad_s.map(f64::to_bits).hash(&mut hasher);
         scale.refusal.hash(&mut hasher);

@@ -62,7 +62,7 @@ impl NoiseHistory {
     /// Sums over all whole windows of normal mode.
     pub fn new(windows: &BTreeMap<i64, Window>, resolution_ng: &[[f64; 3]; 3]) -> Self {
         let mut sums = [Sums::default(); 3];
-        let mut entries = Vec::new();
+        let mut entries = Vec::with_capacity(windows.len());
         let whole = |cell: i64| windows.get(&cell).filter(|w| w.quality == Quality::GOOD);
         for cell in windows.keys() {
             let (Some(last), Some(before)) = (whole(*cell), whole(cell - LAG_CELLS)) else { continue };

@@ -3,6 +3,7 @@
 //! The on-board estimates are recomputed from the samples with both estimators and compared in their own 1/16 counts,
 //! rounded to nearest, ties to even. They agree bit for bit or they do not; no threshold is needed.
 
+use crate::math::ranked::{Pair, Ranked};
 use crate::math::robust::{TrimLaw, flight_trimmed_mean, trimmed_mean};
 use crate::pipeline::archive::Archive;
 use crate::telemetry::{AccRecord, OnBoardEstimate, Range};
@@ -42,7 +43,7 @@ pub fn sixteenths(counts: f64) -> i32 {
     (counts * 16.0).round_ties_even() as i32
 }
 
-/// The 500 samples of an on-board window, in ascending order per axis; None when a second is missing or at the rail.
+/// The 500 samples of an on-board window per axis; None when a second is missing or at the rail.
 pub fn samples_of(archive: &Archive, estimate: &OnBoardEstimate) -> Option<([Vec<i16>; 3], [Range; 3])> {
     let (from, to) = (estimate.clock, estimate.clock.plus_tenths(SAMPLES as i64));
     let mut counts: [Vec<i16>; 3] = Default::default();
@@ -63,7 +64,6 @@ pub fn samples_of(archive: &Archive, estimate: &OnBoardEstimate) -> Option<([Vec
     if counts[0].len() != SAMPLES {
         return None;
     }
-    counts.iter_mut().for_each(|axis| axis.sort_unstable());
     Some((counts, ranges?))
 }
 
@@ -77,9 +77,9 @@ pub fn compare(archive: &Archive, law: &TrimLaw) -> OneSided {
         let Some((counts, ranges)) = samples_of(archive, estimate) else { continue };
         let first = found.span.map_or(estimate.clock, |span| span[0]);
         found.span = Some([first, estimate.clock.plus_tenths(SAMPLES as i64)]);
-        for (axis, sorted) in counts.iter().enumerate() {
-            let (Some(right), Some((flight, ..))) = (trimmed_mean(sorted, law), flight_trimmed_mean(sorted, law))
-            else {
+        for (axis, counts) in counts.into_iter().map(Ranked::of).enumerate() {
+            let all = Pair([&counts, &Ranked::default()]);
+            let (Some(right), Some((flight, ..))) = (trimmed_mean(all, law), flight_trimmed_mean(all, law)) else {
                 continue;
             };
             if ranges[axis] == Range::C {

@@ -206,7 +206,7 @@ fn sequence(
         return Some(found);
     };
     let figures = |mean: TrimmedMean| [mean.mean, mean.independent_standard_error()];
-    let mean = |hold: &Hold<'_>, least: usize| hold.mean(axis, law, least, |_| 0.0).map(figures);
+    let mean = |hold: &Hold<'_>, least: usize| hold.plain_mean(axis, law, least).map(figures);
     let means = (mean(pre, STILL_SAMPLES_MIN), mean(rate, RATE_SAMPLES_MIN), mean(post, STILL_SAMPLES_MIN));
     let (Some(a), Some(b), Some(c)) = means else {
         found.refusal = Some(Refusal::Gap);

@@ -1,6 +1,8 @@
 //! The steps of the calibration sequences, cut out of the records: runs of seconds in one mode, target, step and range.
 
-use crate::math::robust::{TrimLaw, TrimmedMean, trimmed_mean};
+use std::cell::OnceCell;
+
+use crate::math::robust::{TrimLaw, TrimmedMean, trimmed_mean_of};
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
 use crate::pipeline::window::Window;
 use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, SAMPLES_PER_RECORD, Step};
@@ -16,6 +18,8 @@ const NEXT_TENTHS_MAX: i64 = 600;
 pub struct Hold<'a> {
     /// Its seconds, in order.
     pub records: Vec<&'a AccRecord>,
+    /// The estimates of its samples as they are, made once: every version of the calibration asks for them.
+    plain: [OnceCell<Option<TrimmedMean>>; 3],
 }
 
 impl Hold<'_> {
@@ -83,13 +87,18 @@ impl Hold<'_> {
         samples_min: usize,
         transient: impl Fn(f64) -> f64,
     ) -> Option<TrimmedMean> {
-        let mut counts: Vec<i16> =
+        let counts: Vec<i16> =
             self.samples(axis).map(|(t_s, count)| (f64::from(count) - transient(t_s)).round() as i16).collect();
         if counts.len() < samples_min {
             return None;
         }
-        counts.sort_unstable();
-        trimmed_mean(&counts, law)
+        trimmed_mean_of(counts, law)
+    }
+
+    /// As [`Hold::mean`], of the samples as they are. All calls must use the same law.
+    pub fn plain_mean(&self, axis: Axis, law: &TrimLaw, samples_min: usize) -> Option<TrimmedMean> {
+        let estimate = self.plain[axis.index()].get_or_init(|| self.mean(axis, law, 1, |_| 0.0));
+        estimate.filter(|estimate| estimate.points >= samples_min)
     }
 
     /// Whether seconds or samples are missing that the step should have.
@@ -119,7 +128,7 @@ pub fn holds<'a>(archive: &'a Archive, windows: &std::collections::BTreeMap<i64,
         }
         match holds.last_mut() {
             Some(hold) if open && continues(hold, record) => hold.records.push(record),
-            _ => holds.push(Hold { records: vec![record] }),
+            _ => holds.push(Hold { records: vec![record], plain: Default::default() }),
         }
         open = true;
     }

@@ -188,7 +188,7 @@ fn skew(transient: &Transient, holds: &[&Hold<'_>], axis: Axis, law: &TrimLaw, s
     let skews: Vec<f64> = holds
         .iter()
         .filter_map(|hold| {
-            let raw = hold.mean(axis, law, samples_min, |_| 0.0)?;
+            let raw = hold.plain_mean(axis, law, samples_min)?;
             let freed = hold.mean(axis, law, samples_min, |t_s| transient.counts(t_s))?;
             Some(0.5 * (raw.mean - freed.mean))
         })

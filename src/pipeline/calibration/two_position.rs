@@ -97,8 +97,8 @@ impl Pair<'_, '_> {
         settings: &Settings,
     ) -> Option<BiasMeasurement> {
         let (law, least) = (&settings.window.trim, settings.window.samples_min);
-        let at_zero = self.normal.mean(axis, law, least, |_| 0.0)?;
-        let raw = self.opposite.mean(axis, law, least, |_| 0.0)?;
+        let at_zero = self.normal.plain_mean(axis, law, least)?;
+        let raw = self.opposite.plain_mean(axis, law, least)?;
         let freed = match transient {
             Some(transient) => self.opposite.mean(axis, law, least, |t_s| transient.counts(t_s))?,
             None => raw,
