@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, mpsc};
 use tokio::task::JoinHandle;
-use tokio_util::sync::CancellationToken;
+use tokio_util::sync::{CancellationToken, DropGuard};
 
 use crate::api::{self, App, Metrics};
 use crate::config::{Config, ConfigFaults};
@@ -79,7 +79,7 @@ pub struct Service {
     writing: JoinHandle<Result<(), StoreError>>,
     recording: Option<(CancellationToken, JoinHandle<Result<(), RecordError>>)>,
     serving: JoinHandle<io::Result<()>>,
-    diagnosing: Option<(CancellationToken, JoinHandle<()>)>,
+    diagnosing: Option<(DropGuard, JoinHandle<()>)>,
     drain_timeout: Duration,
 }
 
@@ -154,7 +154,7 @@ impl Service {
             let (station, hub, policy) = (station.clone(), hub.clone(), diagnosis.policy.clone());
             let work = Diagnosing { station, hub, desk, expected, policy, gate, stop: stop.clone() };
             let runtime = tokio::runtime::Handle::current();
-            (stop, tokio::task::spawn_blocking(move || work.run(&runtime)))
+            (stop.drop_guard(), tokio::task::spawn_blocking(move || work.run(&runtime)))
         });
         let rules = Rules {
             link: settings.link,
@@ -192,7 +192,7 @@ impl Service {
         self.board.enter(Phase::Draining);
         self.drain.cancel();
         if let Some((stop, diagnosing)) = self.diagnosing {
-            stop.cancel();
+            drop(stop);
             // Neither its pace nor a panic there is one of the products'.
             match tokio::time::timeout(HTTP_PATIENCE, diagnosing).await {
                 Ok(Ok(())) => {}

@@ -78,10 +78,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let truth_path = args.truth.unwrap_or_else(|| args.out.with_extension("truth.csv"));
     write(&truth_path, truth_csv(&windows).as_bytes())?;
     write(&args.out.with_extension("instrument.json"), instrument_json(&mission).as_bytes())?;
-    if let Some(folder) = &args.case {
-        if let Err(problems) = write_case(&mission, folder, &args.out)? {
-            return Ok(refuse(&problems));
-        }
+    if let Some(folder) = &args.case
+        && let Err(problems) = write_case(&mission, folder, &args.out)?
+    {
+        return Ok(refuse(&problems));
     }
     println!(
         "{seconds} seconds in {} frames and {} playback(s): {} octets in {}, truth in {}",

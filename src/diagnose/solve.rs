@@ -106,6 +106,7 @@ pub fn solve_unless(
         merge(&mut listed, more_listed);
         merge(&mut open, more_open);
     }
+    lessen(scene, entries, &mut listed, stop)?;
     Some(Solution { listed, open, null, singles })
 }
 
@@ -218,6 +219,30 @@ fn converged(
         noise = search::weigh_with_own_noise(scene, entries, top, &noise, 2, 50).noise;
     }
     unreachable!("the rounds end by their number")
+}
+
+/// Weighs the best set with one member less, and that again, as long as a member is not needed: what only described slow noise
+/// is found at one noise together with what is real, and every set kept may hold it.
+fn lessen(scene: &Scene, entries: &[Entry], listed: &mut Vec<Weighed>, stop: &dyn Fn() -> bool) -> Option<()> {
+    loop {
+        let Some(best) = listed.first().filter(|best| best.set.members.len() > 1) else { return Some(()) };
+        let key = best.set.key();
+        let mut less = Vec::new();
+        for left_out in 0..best.set.members.len() {
+            if stop() {
+                return None;
+            }
+            let mut set = best.set.clone();
+            set.members.remove(left_out);
+            if !listed.iter().any(|w| w.set.key() == set.key()) {
+                less.push(search::weigh_with_own_noise(scene, entries, &set, &best.noise, 2, 40));
+            }
+        }
+        merge(listed, less);
+        if listed.first().is_none_or(|best| best.set.key() == key) {
+            return Some(());
+        }
+    }
 }
 
 /// Of sets found twice the better weighed one, best first.
