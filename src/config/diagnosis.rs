@@ -34,17 +34,16 @@ pub(super) fn read(section: &mut Section<'_>, folder: &Path) -> Option<Diagnosis
         return None;
     }
     let has_case = section.has("case");
-    for key in ["simulation", "ancillary"] {
+    let case = section.existing("case", folder, true);
+    let case = case.map(|path| if path.is_dir() { path.join("case.toml") } else { path });
+    let [simulation, ancillary] = ["simulation", "ancillary"].map(|key| {
         section.check(key, has_case || section.has(key), || {
             format!(
                 "found nothing; a running diagnosis needs diagnosis.{key} or diagnosis.case, the directory of a case"
             )
         });
-    }
-    let case = section.existing("case", folder, true);
-    let case = case.map(|path| if path.is_dir() { path.join("case.toml") } else { path });
-    let simulation = section.existing("simulation", folder, false);
-    let ancillary = section.existing("ancillary", folder, false);
+        section.existing(key, folder, false)
+    });
     let events = section.existing("events", folder, false);
     let standard = Policy::default();
     let policy = Policy {
