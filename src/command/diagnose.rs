@@ -50,7 +50,7 @@ fn measured(args: &Args) -> anyhow::Result<ExitCode> {
     let (answer, plates) = match read.and_then(|(case, files)| Ok(measured::analyse(&case, &files)?)) {
         Ok(found) => found,
         Err(error) => {
-            eprintln!("oare: {error:#}");
+            eprintln!("oare: {error}");
             return Ok(super::unusable());
         }
     };

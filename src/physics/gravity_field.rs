@@ -25,10 +25,10 @@ pub enum GravityFieldError {
         /// Order.
         order: usize,
     },
-    /// The file ends before its last record.
-    #[error("the file announces degree {degree}, and its record of degree and order {degree} is missing")]
+    /// The records end inside a degree, or there are none.
+    #[error("the records end inside degree {degree}: order {degree} is missing")]
     CutShort {
-        /// The degree announced.
+        /// The highest degree found.
         degree: usize,
     },
 }
@@ -44,6 +44,13 @@ pub struct GravityField {
     s: Vec<f64>,
 }
 
+/// Degree and order of a record.
+fn record(line: &str) -> Option<(usize, usize)> {
+    let mut words = line.split_whitespace();
+    words.next().filter(|key| matches!(*key, "gfc" | "gfct"))?;
+    Some((words.next()?.parse().ok()?, words.next()?.parse().ok()?))
+}
+
 fn index(n: usize, m: usize) -> usize {
     n * (n + 1) / 2 + m
 }
@@ -53,29 +60,26 @@ impl GravityField {
     pub fn from_gfc(text: &str, mjd: f64) -> Result<Self, GravityFieldError> {
         let years = 2000.0 + (mjd - 51_544.5) / 365.25;
         let model = read_gfc(text)?.model.at(years);
-        let degree = model.max_degree();
-        let orders = || (0..=degree).flat_map(|n| (0..=n).map(move |m| (n, m)));
-        if let Some((degree, order)) =
-            orders().find(|&(n, m)| !(model.c(n, m).is_finite() && model.s(n, m).is_finite()))
-        {
-            return Err(GravityFieldError::NotFinite { degree, order });
-        }
-        let last = degree.to_string();
-        let is_last = |line: &str| {
-            let mut words = line.split_whitespace();
-            words.next().is_some_and(|key| key.starts_with("gfc"))
-                && words.next() == Some(&last)
-                && words.next() == Some(&last)
-        };
-        if degree > 0 && !text.lines().rev().any(is_last) {
+        // A field is often cut to fewer degrees than its header announces; whole degrees they must be.
+        let places: Vec<(usize, usize)> = text.lines().filter_map(record).collect();
+        let degree = places.iter().map(|(n, _)| *n).max().unwrap_or(0);
+        if !places.contains(&(degree, degree)) {
             return Err(GravityFieldError::CutShort { degree });
         }
-        Ok(Self::from_coefficients(&model))
+        let not_finite = |&&(n, m): &&(usize, usize)| !(model.c(n, m).is_finite() && model.s(n, m).is_finite());
+        if let Some(&(degree, order)) = places.iter().find(not_finite) {
+            return Err(GravityFieldError::NotFinite { degree, order });
+        }
+        Ok(Self::up_to(degree, &model))
     }
 
     /// From fully normalised coefficients.
     pub fn from_coefficients(normalised: &Coefficients) -> Self {
-        let degree = normalised.max_degree().min(DEGREE_MAX);
+        Self::up_to(normalised.max_degree(), normalised)
+    }
+
+    fn up_to(degree: usize, normalised: &Coefficients) -> Self {
+        let degree = degree.min(DEGREE_MAX);
         let (mut c, mut s) = (vec![0.0; index(degree, degree) + 1], vec![0.0; index(degree, degree) + 1]);
         for n in 0..=degree {
             // N_nm^2 = (2 - delta_0m) (2n + 1) (n - m)! / (n + m)!

@@ -78,7 +78,8 @@ impl Evidence {
         let _ = writeln!(
             page,
             "<h2>The lot</h2>\n<p>The analyser sees a recording and what is left of its simulation, never the lot. Published before \
-             the analysis, as a hash over all lots: <code>{}</code></p>",
+             the analysis, as a hash over all lots: <code>{}</code></p>\n<p>The full model's coefficients come from the same recordings: \
+             that they are met tests the search and its errors, and is no second measurement.</p>",
             self.score.commitment
         );
         let mut terms: Vec<&str> = self.draws.iter().map(|d| d.truth.removed.as_str()).collect();

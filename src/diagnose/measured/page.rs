@@ -197,7 +197,9 @@ fn arcs(out: &mut String, answer: &Answer) {
     let many = answer.arcs.len() > 8;
     let rows = answer.arcs.iter().map(|arc| {
         let coefficients = |effects: &[Effect]| {
-            let one = |effect: &Effect| effect.parameters.first().map(with_error).unwrap_or_default();
+            // A figure stays with its error and unit on one line.
+            let figure = |p: &ParameterAnswer| with_error(p).replace(' ', "\u{a0}");
+            let one = |effect: &Effect| effect.parameters.first().map(figure).unwrap_or_default();
             effects.iter().map(one).collect::<Vec<_>>().join("; ")
         };
         vec![

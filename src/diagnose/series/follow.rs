@@ -33,11 +33,11 @@ impl Follows {
     /// The name for people.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Temperature(..) => "Bias follows temperature",
-            Self::Drift(_) => "Bias decays",
-            Self::Step(_) => "Bias steps",
-            Self::Scale => "Scale factor against the reference",
-            Self::Offset(_) => "Clock runs ahead of the reference's",
+            Self::Temperature(..) => "A bias that follows temperature",
+            Self::Drift(_) => "A decaying bias",
+            Self::Step(_) => "A step of the bias",
+            Self::Scale => "A scale factor against the reference",
+            Self::Offset(_) => "A clock ahead of the reference's",
         }
     }
 

@@ -33,6 +33,14 @@ pub struct Axis {
     pub reference: Option<Vec<f64>>,
 }
 
+impl Axis {
+    /// Differences smaller than this are rounding, not measurement.
+    pub fn rounding(&self) -> f64 {
+        let all = self.values.iter().chain(self.reference.iter().flatten());
+        1e-12 * all.map(|v| v.abs()).fold(0.0, f64::max)
+    }
+}
+
 /// One covariate.
 #[derive(Debug, Clone)]
 pub struct CovariateSeries {

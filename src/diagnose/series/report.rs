@@ -101,7 +101,7 @@ impl Row<'_> {
     fn arc(&self) -> ArcAnswer {
         let (first, last) = (&self.found.fits[0], self.found.last());
         let effects = self.effects();
-        let left = last.rms() / short_term(&last.residuals).max(1e-300);
+        let left = last.rms() / self.floor();
         let slow = left > LEFT_FACTOR && !self.axis.control;
         let note = slow.then(|| {
             let removed = 100.0 * (1.0 - (last.rms() / first.rms()).powi(2));
@@ -220,7 +220,7 @@ fn fit(measured: &[&Row<'_>]) -> Fit {
     let before_rms: Vec<f64> = measured.iter().map(|row| held_out(row.series, row.axis, &row.found.included)).collect();
     let after_rms: Vec<f64> = measured.iter().map(|row| held_out(row.series, row.axis, &row.found.model())).collect();
     let held = HeldOut {
-        scheme: "blocks of six hours (or an eighth of what is shorter), every other one left out in turn".to_owned(),
+        scheme: "blocks of six hours (four means where they are rarer, an eighth of a shorter span), every other one left out in turn".to_owned(),
         excess_removed: 1.0 - power(&after_rms) / power(&before_rms).max(1e-300),
         before_rms,
         after_rms,
@@ -235,7 +235,7 @@ fn fit(measured: &[&Row<'_>]) -> Fit {
 
 impl Row<'_> {
     fn floor(&self) -> f64 {
-        short_term(&self.found.last().residuals).max(1e-300)
+        short_term(&self.found.last().residuals).max(self.axis.rounding()).max(1e-300)
     }
 }
 

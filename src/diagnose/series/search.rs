@@ -22,6 +22,8 @@ const STEPS: usize = 3;
 const OFFSETS: [f64; 11] = [0.0, 1.0, 2.0, 4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0];
 /// Held-out prediction leaves out blocks of this length in turn, s, or of an eighth of the shortest span.
 const HELD_OUT_S: f64 = 6.0 * 3600.0;
+/// Where means are rarer, so many of them together.
+const HELD_OUT_BLOCKS_MIN: f64 = 4.0;
 const EFFECTS_MAX: usize = 4;
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
@@ -118,7 +120,9 @@ pub fn search(series: &Series, axis: &Axis, included: &[Follows]) -> AxisFound {
     let mut model: Vec<Follows> = included.to_vec();
     let mut scores = Vec::new();
     let mut refused = 0.0;
-    for _ in 0..EFFECTS_MAX {
+    // An axis that does not move but for rounding follows nothing.
+    let still = regress(series, axis, included).rms() <= axis.rounding();
+    for _ in 0..if still { 0 } else { EFFECTS_MAX } {
         let Step { best, strongest } = step(series, axis, &model, &beat);
         refused = strongest;
         let Some((candidate, score)) = best else { break };
@@ -330,7 +334,7 @@ fn widen(
 pub fn held_out(series: &Series, axis: &Axis, effects: &[Follows]) -> f64 {
     let equation = equation(series, axis, effects);
     let (design, values) = (design(series, &equation), &equation.values);
-    let block_s = HELD_OUT_S.min(series.shortest_span_s() / 8.0).max(1e-9);
+    let block_s = HELD_OUT_S.max(HELD_OUT_BLOCKS_MIN * series.beat_s()).min(series.shortest_span_s() / 8.0).max(1e-9);
     let fold = |t: f64| (((t - series.t_s[0]) / block_s) as usize) % 2;
     let mut squares = 0.0;
     for left_out in 0..2 {
