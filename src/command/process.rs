@@ -11,6 +11,7 @@ use oare_ground::config::Config;
 use oare_ground::hub::{Body, Message};
 use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader, Verdict};
 use oare_ground::pipeline::calibration::KnownCalibration;
+use oare_ground::pipeline::report::report;
 use oare_ground::pipeline::station::replay;
 use oare_ground::pipeline::{PlaybackId, Station, files};
 use oare_ground::record::{mcap_file::Recording, mcap_reader};
@@ -28,6 +29,9 @@ pub struct Args {
     /// Configuration file; STS-65 without it.
     #[arg(long)]
     config: Option<PathBuf>,
+    /// Folder for a report: a page with accuracy tables, calibration and histories, its figures, and the tables as JSON.
+    #[arg(long)]
+    report: Option<PathBuf>,
     /// Known bias laws and scale factors, taken instead of estimating them.
     #[arg(long)]
     calibration: Option<PathBuf>,
@@ -68,6 +72,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let station = replay(&settings, known.as_ref(), |station| take_all(station, &streams));
     write_products(&station, &args.out)?;
     write_recording(&station, &streams, &args.out.join("recording.mcap"))?;
+    if let Some(folder) = &args.report {
+        write_report(&station, folder)?;
+    }
     summarise(&station, args.json)
 }
 
@@ -151,6 +158,18 @@ fn write_products(station: &Station, out: &Path) -> Result<()> {
     write("calibration.json", pretty(&files::calibration_json(station))?)?;
     write("anomalies.json", pretty(&files::anomalies_json(station))?)?;
     write("ledger.json", pretty(&files::ledger_json(station))?)
+}
+
+fn write_report(station: &Station, folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    let write = |name: &str, text: &str| {
+        let path = folder.join(name);
+        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+    };
+    let report = report(station);
+    write("index.html", &report.html)?;
+    write("accuracy.json", &(serde_json::to_string_pretty(&report.accuracy)? + "\n"))?;
+    report.figures.iter().try_for_each(|(name, svg)| write(name, svg))
 }
 
 /// Tells what was taken in, and what could not be used.

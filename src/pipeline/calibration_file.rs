@@ -50,6 +50,7 @@ fn measurement_json(measurement: &BiasMeasurement) -> Value {
         "settling_removed_counts": rounded(measurement.settling_counts, 4),
         "trim": measurement.trim.map(|trim| rounded(trim, 4)),
         "quiet": measurement.quiet,
+        "unsteady": measurement.unsteady,
         "use": measurement.use_word(),
         "weight": rounded(measurement.weight, 3),
         "deviation_sigma": rounded(measurement.deleted_sigma, 3),
@@ -188,7 +189,8 @@ fn time_correlation_json(derived: &Derived) -> Value {
     })
 }
 
-fn accuracy_json(derived: &Derived) -> Value {
+/// The accuracy analysis, with what was published beside it.
+pub(super) fn accuracy_json(derived: &Derived) -> Value {
     let mut axes = Map::new();
     for axis in Axis::ALL {
         let i = axis.index();
@@ -214,6 +216,9 @@ fn axis_accuracy_json(a: &AxisAccuracy) -> Value {
         "bias_fit_rms_ng": a.bias_fit_rms_ng,
         "bias_fit_rms_without_outliers_ng": a.bias_fit_rms_used_ng,
         "measurements": a.measurements,
+        "quiet_measurements": a.quiet_measurements,
+        "quiet_bias_fit_rms_counts": a.quiet_fit_rms.map(|[counts, _]| counts),
+        "quiet_bias_fit_rms_ng": a.quiet_fit_rms.map(|[_, ng]| ng),
         "degrees_of_freedom": a.degrees_of_freedom,
         "statistical_ng": a.statistical_ng,
         "fitted_sigma_ng": a.fitted_sigma_ng,

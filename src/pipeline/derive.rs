@@ -7,6 +7,7 @@ use super::calibration::{Calibrated, Calibration, Measured, RangeCorrection};
 use super::product::{BodyAcceleration, Product, Revision};
 use super::settings::WindowPolicy;
 use super::window::{AxisWindow, WINDOW_TENTHS, Window};
+use crate::math::robust::rounding_error_trimmed;
 use crate::telemetry::{Axis, Quality, Range};
 
 /// The product of a window by a calibration, or without one.
@@ -85,6 +86,7 @@ fn measured(window: &Window, axis: Axis, range: Range, counts: &AxisWindow, poli
         trimmed_counts: counts.estimate.mean,
         mean_counts: counts.estimate.plain_mean,
         independent_counts: counts.estimate.independent_standard_error(),
+        rounding_counts: rounding_error_trimmed(counts.estimate.winsorised_sd),
         noise_factor: policy.correlated_samples.sqrt(),
     }
 }

@@ -12,6 +12,7 @@ pub mod files;
 pub mod frames;
 pub mod ledger;
 pub mod product;
+pub mod report;
 pub mod settings;
 pub mod station;
 pub mod window;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::archive::{Addition, Archive, cell_of};
-use super::calibration::{self, Anomaly, Calibration, Derived, KnownCalibration};
+use super::calibration::{self, Anomaly, Calibration, Derived, KnownCalibration, RangeCorrection};
 use super::derive;
 use super::frames::{FrameDigest, FrameSet, Novelty};
 use super::ledger::{Ledger, PlaybackId};
@@ -50,6 +50,11 @@ pub enum Change {
     Raw(Box<AccRecord>),
 }
 
+/// Cells of new samples after which normal mode is checked for anomalies again: an hour.
+const CHECK_CELLS: usize = 144;
+/// And no fewer than this share of all cells, so that the checks of a mission that comes down at once cost little.
+const CHECK_SHARE: usize = 8;
+
 /// Frames in, changes out, products at any time.
 pub struct Station {
     settings: Settings,
@@ -66,8 +71,10 @@ pub struct Station {
     touched: BTreeSet<i64>,
     /// Whether anything that calibration depends on is new.
     calibration_touched: bool,
-    /// Whether windows are new that the checks of the calibration look at; they wait for [`Station::flush`].
+    /// Whether anything is new that the checks of the calibration look at, and in how many cells; they wait for the next
+    /// calibration, for [`CHECK_CELLS`] or for [`Station::flush`].
     checks_touched: bool,
+    cells_unchecked: usize,
     /// Windows whose product changed and was not announced.
     unannounced: BTreeSet<i64>,
     announced: BTreeMap<i64, Revision>,
@@ -101,6 +108,7 @@ impl Station {
             touched: BTreeSet::new(),
             calibration_touched: true,
             checks_touched: false,
+            cells_unchecked: 0,
             unannounced: BTreeSet::new(),
             announced: BTreeMap::new(),
             announced_gaps: BTreeSet::new(),
@@ -294,6 +302,7 @@ impl Station {
 
     fn recompute_windows(&mut self) -> BTreeSet<i64> {
         let cells = std::mem::take(&mut self.touched);
+        self.cells_unchecked += cells.len();
         let starts: BTreeSet<i64> = cells.iter().flat_map(|cell| [cell - 1, *cell]).collect();
         let held = &mut self.windows;
         windows(&self.archive, starts.iter().copied(), &self.settings.window, |cell, window| {
@@ -307,9 +316,12 @@ impl Station {
 
     /// Derives the calibration anew where anything it depends on came; whether a product may change by it.
     fn recompute_calibration(&mut self) -> bool {
-        if !std::mem::take(&mut self.calibration_touched) {
+        let due = self.cells_unchecked >= CHECK_CELLS.max(self.windows.len() / CHECK_SHARE);
+        if !(std::mem::take(&mut self.calibration_touched) || due && self.checks_touched) {
             return false;
         }
+        self.checks_touched = false;
+        self.cells_unchecked = 0;
         let derived =
             calibration::derive(&self.archive, &self.windows, &self.settings, self.known.as_ref(), Some(&self.derived));
         let changed =
@@ -411,7 +423,13 @@ impl Station {
     pub fn product_as_of(&self, start: Clock, known_at: Clock) -> Option<Product> {
         let window = self.windows.get(&cell_of(start)).filter(|window| window.start == start)?;
         let calibration = self.derived.as_of(known_at);
-        Some(derive::product(window, calibration, &self.derived.range_corrections, &self.settings.window))
+        let corrections = self.range_corrections_as_of(known_at);
+        Some(derive::product(window, calibration, &corrections, &self.settings.window))
+    }
+
+    /// The spans of wrongly reported ranges as they were known at an instrument clock.
+    pub fn range_corrections_as_of(&self, known_at: Clock) -> Vec<RangeCorrection> {
+        calibration::range_corrections_as_of(&self.archive, &self.windows, &self.derived, known_at)
     }
 
     /// Events in order.

@@ -3,9 +3,7 @@
 use nalgebra::UnitQuaternion;
 use rand::RngExt;
 
-use crate::physics::attitude::{
-    Attitude, between, from_euler, hold_lvlh, lvlh_from_inertial, rate_rad_s, smooth_fraction,
-};
+use crate::physics::attitude::{Attitude, from_euler, hold_lvlh, lvlh_from_inertial, rate_rad_s, smooth_fraction};
 use crate::physics::orbit::{STEP_S_MAX, State, gravity_m_s2, step};
 use crate::physics::{J2, PhysicsError, Vec3};
 
@@ -59,6 +57,8 @@ struct Leg {
     hold: AttitudeHold,
     /// Attitude at the beginning, for an inertial hold.
     inertial: Attitude,
+    /// The turn from the hold before, at the beginning: angle times axis.
+    turn_rad: Vec3,
 }
 
 /// Where the vehicle is, how it points and turns.
@@ -96,7 +96,11 @@ impl Trajectory {
             let state = trajectory.state(hold.from_clock_s.max(first_clock_s));
             let e = hold.euler_rad;
             let inertial = from_euler(e.x, e.y, e.z) * lvlh_from_inertial(&state);
-            trajectory.legs.push(Leg { hold: *hold, inertial });
+            let mut leg = Leg { hold: *hold, inertial, turn_rad: Vec3::zeros() };
+            if let Some(before) = trajectory.legs.last() {
+                leg.turn_rad = (held(&leg, &state) * held(before, &state).inverse()).scaled_axis();
+            }
+            trajectory.legs.push(leg);
         }
         Ok(trajectory)
     }
@@ -137,7 +141,8 @@ impl Trajectory {
         let since_s = clock_s - self.legs[leg].hold.from_clock_s;
         if leg > 0 && since_s < self.manoeuvre_s {
             let before = held(&self.legs[leg - 1], state);
-            attitude = between(&before, &attitude, smooth_fraction(since_s / self.manoeuvre_s));
+            let turn = turn_near(&before, &attitude, &self.legs[leg].turn_rad);
+            attitude = UnitQuaternion::from_scaled_axis(turn * smooth_fraction(since_s / self.manoeuvre_s)) * before;
         }
         let tilt = self.wobble.map(|swings| {
             swings.iter().map(|s| s.amplitude_rad * (s.rate_rad_s * clock_s + s.phase_rad).sin()).sum::<f64>()
@@ -154,6 +159,18 @@ impl Trajectory {
         let late = rate_rad_s(&attitude, &self.attitude(clock_s + h), h);
         Situation { state, attitude, rate_rad_s: (early + late) / 2.0, acceleration_rad_s2: (late - early) / h }
     }
+}
+
+/// The turn from one attitude to the other, the way round that is nearer to a known turn. Both holds move while the vehicle turns
+/// from one to the other; the shorter way may become the longer one, and no vehicle changes its mind half way.
+fn turn_near(from: &Attitude, to: &Attitude, known_rad: &Vec3) -> Vec3 {
+    let turn = (to * from.inverse()).scaled_axis();
+    let angle = turn.norm();
+    if angle < 1e-9 {
+        return turn;
+    }
+    let other = turn * (1.0 - std::f64::consts::TAU / angle);
+    if (other - known_rad).norm_squared() < (turn - known_rad).norm_squared() { other } else { turn }
 }
 
 fn held(leg: &Leg, state: &State) -> Attitude {
@@ -207,6 +224,20 @@ mod tests {
             let t = start + f64::from(k) * 10.0;
             let turned = trajectory.attitude(t).angle_to(&trajectory.attitude(t + 1.0));
             assert!(turned < 0.012, "{turned} rad in a second at {t}");
+        }
+    }
+
+    #[test]
+    fn a_manoeuvre_goes_on_the_way_it_began() {
+        // In 14.75 days the holds pass through half a turn from each other during a manoeuvre.
+        let config = MissionConfig::sts65(7, 354.0);
+        let trajectory = Trajectory::new(&config).unwrap();
+        for hold in &config.attitudes {
+            for k in 0..120 {
+                let t = hold.from_clock_s + f64::from(k) * 5.0;
+                let turned = trajectory.attitude(t).angle_to(&trajectory.attitude(t + 1.0));
+                assert!(turned < 0.025, "{turned} rad in a second at {t}");
+            }
         }
     }
 

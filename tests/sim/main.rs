@@ -1,8 +1,15 @@
 //! The simulator and its physics against the sample data, which others made.
 
+#[cfg(feature = "slow")]
+mod anomalies;
 mod calibration;
+#[cfg(feature = "slow")]
+mod coverage;
+mod flown;
 mod onboard;
 mod open_cases;
+#[cfg(feature = "slow")]
+mod settling;
 
 use std::path::{Path, PathBuf};
 

@@ -24,7 +24,7 @@ pub struct AxisAccuracy {
     pub signal_differences: f64,
     /// RMS of measured less fitted bias over all measurements, counts.
     pub bias_fit_rms_counts: f64,
-    /// The same without outliers.
+    /// The same without outliers, and without measurements taken while the Orbiter turned.
     pub bias_fit_rms_used_counts: f64,
     /// The same, ng (nominal).
     pub bias_fit_rms_ng: f64,
@@ -32,6 +32,10 @@ pub struct AxisAccuracy {
     pub bias_fit_rms_used_ng: f64,
     /// Measurements, and degrees of freedom of the fit.
     pub measurements: usize,
+    /// Of those, measurements while quiet was asserted.
+    pub quiet_measurements: usize,
+    /// RMS of measured less fitted bias of these, counts and ng; None without any.
+    pub quiet_fit_rms: Option<[f64; 2]>,
     /// Degrees of freedom.
     pub degrees_of_freedom: f64,
     /// Bias fit RMS / sqrt(degrees of freedom), ng.

@@ -1,4 +1,6 @@
-//! What can go wrong with the instrument, as it is told to operators.
+//! What can go wrong with the instrument, as it is told to operators, and how sure one must be to tell it.
+
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::telemetry::{Axis, Range};
 use crate::units::Clock;
@@ -43,6 +45,21 @@ impl AnomalyKind {
     }
 }
 
+/// False anomalies that chance may tell, per mission, over all kinds.
+const FALSE_PER_MISSION: f64 = 1e-3;
+/// Kinds that share them: all but the estimator, which is compared bit for bit.
+const KINDS: f64 = 8.0;
+
+/// Standard errors beyond which a level shift is told after so many scale sequences: its kind's share of the false anomalies
+/// of a mission, over three axes and over the looks, of which the n-th gets 1/(n (n + 1)), so that all of them together get
+/// one. 4.25 at the first, 5.4 at the twenty-eighth. (A bias outlier's bound of six errors spends 2e-6 on the thousand
+/// measurements of a mission, a settling transient's six 4e-9 a look: within their shares.)
+pub(super) fn shift_sigma(looks: usize) -> f64 {
+    let looks = looks.max(1) as f64;
+    let share = FALSE_PER_MISSION / KINDS / 3.0 / (looks * (looks + 1.0));
+    -Normal::standard().inverse_cdf(0.5 * share)
+}
+
 /// Something that went wrong.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Anomaly {
@@ -77,4 +94,16 @@ pub struct RangeCorrection {
     pub reported: Range,
     /// What the sensor was in.
     pub actual: Range,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn looking_again_and_again_spends_no_more_than_the_share() {
+        let spent: f64 = (1..2000).map(|n| 2.0 * (1.0 - Normal::standard().cdf(shift_sigma(n)))).sum();
+        assert!((0.9..=1.0).contains(&(spent * 3.0 * KINDS / FALSE_PER_MISSION)), "{spent}");
+        assert!((shift_sigma(1) - 4.25).abs() < 0.01, "{}", shift_sigma(1));
+    }
 }

@@ -58,6 +58,13 @@ pub enum Bias {
 }
 
 impl Bias {
+    fn law(&self) -> &BiasLaw {
+        match self {
+            Bias::Known(law) => law,
+            Bias::Fitted(fit) => &fit.law,
+        }
+    }
+
     /// Bias and its standard error, counts; and whether the clock lies outside the measurements.
     fn at(&self, met_h: f64, temperature_c: f64) -> (f64, f64, bool) {
         match self {
@@ -110,6 +117,8 @@ pub struct Measured {
     pub mean_counts: f64,
     /// Standard error of the trimmed mean if its samples were independent, counts.
     pub independent_counts: f64,
+    /// Error of the trimmed mean by rounding to whole counts, counts.
+    pub rounding_counts: f64,
     /// Factor from independent to true, where the calibration has none.
     pub noise_factor: f64,
 }
@@ -143,7 +152,7 @@ impl Calibration {
     /// Bias of an axis and range, counts; None when there is none yet.
     pub fn bias_at(&self, axis: Axis, range: Range, clock_s: f64, temperature_c: f64) -> Option<f64> {
         let bias = self.bias[axis.index()][range.index()].as_ref()?;
-        Some(bias.at(self.time.met_h(clock_s), temperature_c).0)
+        Some(bias.law().counts(self.time.met_h(clock_s), temperature_c))
     }
 
     /// Bias and its standard error, counts.
@@ -164,7 +173,8 @@ impl Calibration {
         let trimmed_ng = (measured.trimmed_counts - bias_counts) * ng_per_count;
         let scale_ng = trimmed_ng * scale.sigma / scale.correction;
         let factor = self.noise.map_or(measured.noise_factor, |noise| noise.factor[axis]);
-        let counts_ng = ng_per_count * (factor * measured.independent_counts).hypot(bias_sigma);
+        let noise = (factor * measured.independent_counts).hypot(measured.rounding_counts);
+        let counts_ng = ng_per_count * noise.hypot(bias_sigma);
         Some(Calibrated {
             trimmed_ng,
             mean_ng: (measured.mean_counts - bias_counts) * ng_per_count,

@@ -91,7 +91,7 @@ pub struct BiasFit {
     pub chi2_reduced: f64,
     /// Root mean square residual of the measurements used, counts.
     pub residual_rms: f64,
-    /// Share of the measurements' variance that the law describes.
+    /// Share of the measurements' variance, each by its error, that the law describes.
     pub r_squared: Option<f64>,
     /// Measurements used less figures carried.
     pub degrees_of_freedom: f64,
@@ -381,9 +381,13 @@ impl BiasFit {
         let count = used.len() as f64;
         let square = |n: &usize| self.residuals[*n].powi(2);
         self.residual_rms = (used.iter().map(square).sum::<f64>() / count).sqrt();
-        let mean = used.iter().map(|n| points[*n].counts).sum::<f64>() / count;
-        let total: f64 = used.iter().map(|n| (points[*n].counts - mean).powi(2)).sum();
-        self.r_squared = (count > 2.0 && total > 0.0).then(|| 1.0 - used.iter().map(square).sum::<f64>() / total);
+        // Weighted, so that a measurement worth nothing does not decide.
+        let weight = |n: &usize| points[*n].sigma_counts.powi(-2);
+        let all: f64 = used.iter().map(weight).sum();
+        let mean = used.iter().map(|n| weight(n) * points[*n].counts).sum::<f64>() / all;
+        let total: f64 = used.iter().map(|n| weight(n) * (points[*n].counts - mean).powi(2)).sum();
+        let left: f64 = used.iter().map(|n| weight(n) * square(n)).sum();
+        self.r_squared = (count > 2.0 && total > 0.0).then(|| 1.0 - left / total);
         self.degrees_of_freedom = count - self.figures_carried;
         if self.degrees_of_freedom >= 1.0 {
             let chi2: f64 = used.iter().map(|n| square(n) / points[*n].sigma_counts.powi(2)).sum();

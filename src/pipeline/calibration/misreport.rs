@@ -8,7 +8,6 @@ use std::collections::BTreeMap;
 
 use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 use super::apply::Calibration;
-use crate::math::robust::median;
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
 use crate::pipeline::window::Window;
 use crate::telemetry::{AccRecord, Axis, Mode, Range};
@@ -18,6 +17,10 @@ use crate::units::Clock;
 const LN_SCATTER_WIDTH: f64 = 1.0;
 /// Quasi-steady accelerations are within this, ng: drag, gravity gradient, rotation.
 const LEVEL_NG: f64 = 1500.0;
+/// While the Orbiter turns they are within this, ng.
+const MANOEUVRE_NG: f64 = 20_000.0;
+/// Share of the time it turns: ten minutes in every seventeen hours, and half of that again to be fair.
+const MANOEUVRE_SHARE: f64 = 0.015;
 /// A window speaks for another range when its weight of evidence (natural logarithm) is above this.
 const EVIDENCE_MIN: f64 = 20.0;
 /// Windows that make a span.
@@ -54,42 +57,67 @@ impl Usual<'_> {
         let bias = self.calibration.bias_at(seen.axis, range, seen.clock_s, seen.temperature_c)?;
         let usual = (self.scatter_ng[i] / resolution).max(SCATTER_COUNTS_MIN);
         let scatter = (seen.scatter.max(SCATTER_COUNTS_MIN) / usual).ln() / LN_SCATTER_WIDTH;
-        let width = (level_ng / resolution).hypot(1.0);
-        let level = (seen.level - bias) / width;
-        Some(-0.5 * (scatter * scatter + (level * level).min(400.0)))
+        let ln_normal = |ng: f64| {
+            let width = (ng / resolution).hypot(1.0);
+            -0.5 * ((seen.level - bias) / width).powi(2) - width.ln()
+        };
+        let still = (1.0 - MANOEUVRE_SHARE).ln() + ln_normal(level_ng);
+        let turning = MANOEUVRE_SHARE.ln() + ln_normal(MANOEUVRE_NG.hypot(level_ng));
+        let level = still.max(turning) + (-(still - turning).abs()).exp().ln_1p();
+        // In units of the narrow density's height: a level says what it says of the size of a count, and no more.
+        let height = -((level_ng / resolution).hypot(1.0)).ln();
+        Some(-0.5 * scatter * scatter + (level - height).max(-200.0))
     }
 }
 
-fn usual_scatter_ng(windows: &BTreeMap<i64, Window>, resolution_ng: &[[f64; 3]; 3]) -> Option<[f64; 3]> {
+fn usual_scatter_ng<'w>(
+    windows: impl Iterator<Item = (&'w i64, &'w Window)> + Clone,
+    resolution_ng: &[[f64; 3]; 3],
+) -> Option<[f64; 3]> {
     let mut usual = [0.0; 3];
     for axis in 0..3 {
         let mut all: Vec<f64> = windows
-            .values()
-            .filter(|w| w.mode == Mode::Normal)
-            .filter_map(|w| w.axes[axis].map(|a| a.estimate.winsorised_sd * resolution_ng[axis][a.range.index()]))
+            .clone()
+            .filter(|(_, w)| w.mode == Mode::Normal)
+            .filter_map(|(_, w)| w.axes[axis].map(|a| a.estimate.winsorised_sd * resolution_ng[axis][a.range.index()]))
             .collect();
-        usual[axis] = median(&mut all)?;
+        // The middle is enough; the mean of the two inner ones would cost a whole sort.
+        let middle = all.len().checked_sub(1)? / 2;
+        usual[axis] = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
     }
     Some(usual)
+}
+
+/// What speaks against the ranges reported, at most: no other range explains a window better than perfectly.
+fn against(usual: &Usual<'_>, window: &Window) -> Option<f64> {
+    let mut total = 0.0;
+    for axis in Axis::ALL {
+        total -= usual.favour(&seen(window, axis)?, window.axes[axis.index()]?.range, LEVEL_NG)?;
+    }
+    Some(total)
+}
+
+fn seen(window: &Window, axis: Axis) -> Option<Seen> {
+    let of_axis = window.axes[axis.index()]?;
+    Some(Seen {
+        axis,
+        level: of_axis.estimate.mean,
+        scatter: of_axis.estimate.winsorised_sd,
+        clock_s: window.centre_s(),
+        temperature_c: window.temperature_c,
+    })
 }
 
 /// One window's evidence for a range: per axis, log likelihood over that of the range reported.
 fn evidence(usual: &Usual<'_>, window: &Window, actual: Range) -> Option<[f64; 3]> {
     let mut of_axes = [0.0; 3];
     for axis in Axis::ALL {
-        let seen = window.axes[axis.index()]?;
-        if seen.range == actual {
+        let reported = window.axes[axis.index()]?.range;
+        if reported == actual {
             continue;
         }
-        let seen_as = Seen {
-            axis,
-            level: seen.estimate.mean,
-            scatter: seen.estimate.winsorised_sd,
-            clock_s: window.centre_s(),
-            temperature_c: window.temperature_c,
-        };
-        of_axes[axis.index()] =
-            usual.favour(&seen_as, actual, LEVEL_NG)? - usual.favour(&seen_as, seen.range, LEVEL_NG)?;
+        let seen = seen(window, axis)?;
+        of_axes[axis.index()] = usual.favour(&seen, actual, LEVEL_NG)? - usual.favour(&seen, reported, LEVEL_NG)?;
     }
     Some(of_axes)
 }
@@ -103,16 +131,21 @@ struct Span {
     ln_ratio: Vec<f64>,
 }
 
-/// Finds the spans, their corrections and what to tell.
+/// Finds the spans, their corrections and what to tell, from what was known at an instrument clock.
 pub fn find(
     archive: &Archive,
     windows: &BTreeMap<i64, Window>,
     calibration: &Calibration,
+    known_at: Clock,
 ) -> Vec<(Anomaly, Vec<RangeCorrection>)> {
-    let Some(scatter_ng) = usual_scatter_ng(windows, &calibration.resolution_ng) else { return Vec::new() };
+    let known = || windows.iter().filter(|(_, window)| window.known_since <= known_at);
+    let Some(scatter_ng) = usual_scatter_ng(known(), &calibration.resolution_ng) else { return Vec::new() };
     let usual = Usual { scatter_ng, calibration };
     let mut spans: Vec<Span> = Vec::new();
-    for (cell, window) in windows.iter().filter(|(_, w)| w.mode == Mode::Normal) {
+    for (cell, window) in known().filter(|(_, w)| w.mode == Mode::Normal) {
+        if against(&usual, window).is_none_or(|most| most <= EVIDENCE_MIN) {
+            continue;
+        }
         let best = Range::ALL
             .into_iter()
             .filter_map(|range| evidence(&usual, window, range).map(|of_axes| (range, of_axes)))
@@ -134,7 +167,7 @@ pub fn find(
     spans
         .iter()
         .filter(|span| span.windows >= WINDOWS_MIN)
-        .filter_map(|span| settle_span(archive, &usual, windows, span))
+        .filter_map(|span| settle_span(archive, &usual, windows, span, known_at))
         .collect()
 }
 
@@ -155,6 +188,7 @@ fn settle_span(
     usual: &Usual<'_>,
     windows: &BTreeMap<i64, Window>,
     span: &Span,
+    known_at: Clock,
 ) -> Option<(Anomaly, Vec<RangeCorrection>)> {
     let inside = windows.get(&((span.cells[0] + span.cells[1]) / 2)).or_else(|| windows.get(&span.cells[0]))?;
     let reported: Vec<(Axis, Range)> = Axis::ALL
@@ -165,8 +199,9 @@ fn settle_span(
     let (_, reported_range) = *reported.first()?;
     let first = Clock::from_tenths(span.cells[0] * 250);
     let last = Clock::from_tenths((span.cells[1] + 2) * 250);
-    let from = end_near(archive, usual, &reported, span.actual, first, true)?;
-    let to = end_near(archive, usual, &reported, span.actual, last, false)?;
+    let seconds = |near| seconds_near(archive, usual, &reported, span.actual, near, known_at);
+    let from = end_near(&seconds(first), true)?;
+    let to = end_near(&seconds(last), false)?;
     let corrections = reported
         .iter()
         .map(|(axis, range)| RangeCorrection { from, to, axis: *axis, reported: *range, actual: span.actual })
@@ -179,11 +214,12 @@ fn settle_span(
     let letters: Vec<String> = axes.iter().map(|axis| axis.letter().to_uppercase()).collect();
     let hours = (to.tenths() - from.tenths()) as f64 / 36_000.0;
     let sentence = format!(
-        "For {hours:.2} h the records say range {} in {} while the sensor was in range {}: the samples scatter {value:.3} times \
+        "For {hours:.2} h the records say range {} in {} while the sensor was in range {}: the samples scatter {} times \
          less than they would; the windows are calibrated in range {} and flagged range_corrected.",
         reported_range.letter(),
         letters.join(", "),
         span.actual.letter(),
+        if value >= 10.0 { format!("{value:.0}") } else { format!("{value:.3}") },
         span.actual.letter(),
     );
     let anomaly = Anomaly {
@@ -220,25 +256,30 @@ fn second_evidence(usual: &Usual<'_>, record: &AccRecord, reported: &[(Axis, Ran
     total.clamp(-SECOND_EVIDENCE_MAX, SECOND_EVIDENCE_MAX)
 }
 
-/// The end of the span nearest to `near`: the split of the seconds around it that their evidence favours most.
-fn end_near(
+/// The seconds around an instant and what each says, as far as they were known.
+fn seconds_near(
     archive: &Archive,
     usual: &Usual<'_>,
     reported: &[(Axis, Range)],
     actual: Range,
     near: Clock,
-    is_start: bool,
-) -> Option<Clock> {
+    known_at: Clock,
+) -> Vec<(Clock, f64)> {
     let (from, to) = (near.plus_tenths(-SEARCH_TENTHS), near.plus_tenths(SEARCH_TENTHS));
-    let seconds: Vec<(Clock, f64)> = archive
+    archive
         .records_between(from, to)
+        .filter(|record| record.clock <= known_at)
         .map(|record| {
             let concerned = record.mode == Mode::Normal
                 && reported.iter().all(|(axis, range)| record.ranges[axis.index()] == *range);
             let says = if concerned { second_evidence(usual, record, reported, actual) } else { -SECOND_EVIDENCE_MAX };
             (record.clock, says)
         })
-        .collect();
+        .collect()
+}
+
+/// The end of a span: the split of the seconds around it that their evidence favours most.
+fn end_near(seconds: &[(Clock, f64)], is_start: bool) -> Option<Clock> {
     let total: f64 = seconds.iter().map(|(_, says)| says).sum();
     let mut before = 0.0;
     let (mut best, mut best_clock) = (f64::NEG_INFINITY, None);

@@ -18,9 +18,10 @@ pub mod sequence;
 pub mod settling;
 pub mod time_correlation;
 mod two_position;
+mod unsteady;
 mod version;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 pub use anomaly::{Anomaly, AnomalyKind, RangeCorrection};
@@ -33,8 +34,10 @@ use self::accuracy::AxisAccuracy;
 use self::noise::{NoiseFactors, NoiseHistory};
 use self::one_sided::OneSided;
 use self::scale_factor::{ScaleMeasurement, ScaleSequence};
-use self::sequence::Hold;
+use self::sequence::{Hold, Means};
 use self::time_correlation::TimeCorrelation;
+use self::two_position::Pair;
+use self::unsteady::Walks;
 use self::version::{Material, version};
 use super::archive::Archive;
 use super::settings::Settings;
@@ -71,6 +74,9 @@ pub struct Derived {
     /// What each version of the estimated timeline was made from, so that it need not be made again.
     signatures: Vec<u64>,
     estimates: Vec<Calibration>,
+    /// Means of the holds and walks of the calibrations, which depend on nothing but their samples.
+    means: HashMap<u64, Means>,
+    walks: Walks,
 }
 
 impl Derived {
@@ -85,6 +91,17 @@ impl Derived {
     }
 }
 
+/// The spans of wrongly reported ranges as they were known at an instrument clock, by the calibration known then.
+pub fn range_corrections_as_of(
+    archive: &Archive,
+    windows: &BTreeMap<i64, Window>,
+    derived: &Derived,
+    known_at: Clock,
+) -> Vec<RangeCorrection> {
+    let found = derived.as_of(known_at).map(|calibration| misreport::find(archive, windows, calibration, known_at));
+    found.into_iter().flatten().flat_map(|(_, corrections)| corrections).collect()
+}
+
 /// Derives calibration and anomalies. With a known calibration, that one is used for every window instead. `previous` only saves
 /// work: versions whose material did not change are taken from it.
 pub fn derive(
@@ -95,18 +112,27 @@ pub fn derive(
     previous: Option<&Derived>,
 ) -> Derived {
     let law = &settings.window.trim;
-    let holds = sequence::holds(archive, windows);
-    let pairs = two_position::pairs(&holds);
-    let scales = scale_factor::sequences(archive, &holds, law);
+    let holds = sequence::holds(archive, windows, law, previous.map(|previous| &previous.means));
+    let mut walks = Walks::default();
+    let walked = previous.map(|previous| &previous.walks);
+    let mut pairs = two_position::pairs(&holds);
+    let excess = unsteady::excess(&holds, &pairs, windows, settings, (&mut walks, walked));
+    pairs.iter_mut().zip(excess).for_each(|(pair, excess)| pair.excess_ng2 = excess);
+    let mut scales = scale_factor::sequences(archive, &holds);
+    unsteady::of_scales(&holds, &mut scales, windows, settings, (&mut walks, walked));
     let history = NoiseHistory::new(windows, &settings.instrument.resolution_ng);
     let configured = settings.window.correlated_samples.sqrt();
     let material = Material { pairs: &pairs, scales: &scales, settings };
-    let mut derived = Derived { scales: scales.iter().map(|s| (s.clone(), None)).collect(), ..Derived::default() };
+    let mut derived = Derived {
+        scales: scales.iter().map(|s| (s.clone(), None)).collect(),
+        means: holds.iter().map(|hold| (hold.digest, hold.means)).collect(),
+        walks,
+        ..Derived::default()
+    };
     let ends = ends(&pairs, &scales);
-    let chain = chain(&holds);
     for (n, known_since) in ends.iter().enumerate() {
         let noise = history.at(*known_since, configured);
-        let signature = signature(&chain, &scales, *known_since, &noise, settings);
+        let signature = signature(&holds, &pairs, &scales, *known_since, &noise, settings);
         let held = previous.filter(|p| p.signatures.get(n) == Some(&signature));
         derived.signatures.push(signature);
         let is_last = n + 1 == ends.len();
@@ -143,7 +169,7 @@ pub fn derive(
 }
 
 /// Clocks at which a calibration was complete, or as far as it came down.
-fn ends(pairs: &[two_position::Pair<'_, '_>], scales: &[ScaleSequence]) -> Vec<Clock> {
+fn ends(pairs: &[Pair<'_, '_>], scales: &[ScaleSequence]) -> Vec<Clock> {
     let mut known: Vec<Clock> =
         pairs.iter().map(|p| p.opposite.last()).chain(scales.iter().map(|s| s.span[1])).collect();
     known.sort_unstable();
@@ -157,27 +183,10 @@ fn ends(pairs: &[two_position::Pair<'_, '_>], scales: &[ScaleSequence]) -> Vec<C
     ends
 }
 
-/// Hashes of the holds up to each, in order of time: every version looks at all that came before it.
-fn chain(holds: &[Hold<'_>]) -> Vec<(Clock, u64)> {
-    let mut hasher = DefaultHasher::new();
-    let mut octets = Vec::new();
-    let link = |hold: &Hold<'_>| {
-        octets.clear();
-        for record in &hold.records {
-            octets.extend(record.clock.tenths().to_le_bytes());
-            octets.extend(record.temperature_c.to_le_bytes());
-            octets.extend(record.ranges.map(|range| range.index() as u8));
-            octets.extend(record.counts.iter().flatten().flat_map(|count| count.to_le_bytes()));
-        }
-        hasher.write(&octets);
-        (hold.start(), hasher.finish())
-    };
-    holds.iter().map(link).collect()
-}
-
 /// Hash of everything a version is made from.
 fn signature(
-    chain: &[(Clock, u64)],
+    holds: &[Hold<'_>],
+    pairs: &[Pair<'_, '_>],
     scales: &[ScaleSequence],
     known_since: Clock,
     noise: &NoiseFactors,
@@ -185,11 +194,15 @@ fn signature(
 ) -> u64 {
     let mut hasher = DefaultHasher::new();
     known_since.hash(&mut hasher);
-    let holds = chain.partition_point(|(start, _)| *start <= known_since);
-    chain[..holds].last().hash(&mut hasher);
+    for hold in holds.iter().take_while(|hold| hold.start() <= known_since) {
+        hold.digest.hash(&mut hasher);
+    }
+    for pair in pairs.iter().take_while(|pair| pair.normal.start() <= known_since) {
+        pair.excess_ng2.map(f64::to_bits).hash(&mut hasher);
+    }
     for scale in scales.iter().filter(|scale| scale.span[1] <= known_since) {
         scale.rate_rad_s.map(f64::to_bits).hash(&mut hasher);
-        scale.refusal.hash(&mut hasher);
+        (scale.refusal, scale.excess_counts2.to_bits()).hash(&mut hasher);
     }
     noise.factor.map(f64::to_bits).hash(&mut hasher);
     noise.half_drift_variance_ng2.map(f64::to_bits).hash(&mut hasher);
@@ -200,7 +213,7 @@ fn signature(
 fn find_anomalies(archive: &Archive, windows: &BTreeMap<i64, Window>, derived: &mut Derived) {
     let mut anomalies = Vec::new();
     if let Some(calibration) = derived.current() {
-        for (anomaly, corrections) in misreport::find(archive, windows, calibration) {
+        for (anomaly, corrections) in misreport::find(archive, windows, calibration, Clock::from_tenths(i64::MAX)) {
             anomalies.push(anomaly);
             derived.range_corrections.extend(corrections);
         }
@@ -226,23 +239,33 @@ fn analyse(axis: Axis, derived: &Derived) -> Option<AxisAccuracy> {
     let Some(Bias::Fitted(fit)) = &calibration.bias[axis.index()][Range::C.index()] else { return None };
     let resolution = calibration.resolution_ng[axis.index()][Range::C.index()];
     let count = fit.residuals.len();
-    let all = (fit.residuals.iter().map(|r| r * r).sum::<f64>() / count as f64).sqrt();
-    let of_law = derived.measurements.iter().filter(|m| m.axis == axis && m.range == Range::C);
-    let sigmas: Vec<f64> = of_law
+    let of_law = || derived.measurements.iter().filter(|m| m.axis == axis && m.range == Range::C);
+    let rms = |squares: &[f64]| (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+    let squares: Vec<f64> = fit.residuals.iter().map(|r| r * r).collect();
+    let used: Vec<f64> =
+        of_law().zip(&squares).filter(|(m, _)| m.weight > 0.0 && !m.unsteady).map(|(_, square)| *square).collect();
+    let (all, rms_used) = (rms(&squares), rms(&used));
+    let degrees_of_freedom = used.len() as f64 - fit.figures_carried;
+    let quiet: Vec<f64> =
+        of_law().zip(&squares).filter(|(m, _)| m.quiet && m.weight > 0.0 && !m.unsteady).map(|(_, s)| *s).collect();
+    let quiet_rms = rms(&quiet);
+    let sigmas: Vec<f64> = of_law()
         .filter_map(|m| calibration.bias_and_error(axis, Range::C, m.clock_s, m.temperature_c).map(|[_, sigma]| sigma))
         .collect();
-    let [rms, mean, differences] = calibration.noise?.signal_differences[axis.index()];
-    let statistical_ng = accuracy::statistical_error(fit.residual_rms * resolution, fit.degrees_of_freedom);
+    let [difference_rms, mean, differences] = calibration.noise?.signal_differences[axis.index()];
+    let statistical_ng = accuracy::statistical_error(rms_used * resolution, degrees_of_freedom);
     Some(AxisAccuracy {
-        signal_difference_rms_counts: (differences > 0.0).then_some(rms),
+        signal_difference_rms_counts: (differences > 0.0).then_some(difference_rms),
         signal_difference_mean_counts: mean,
         signal_differences: differences,
         bias_fit_rms_counts: all,
-        bias_fit_rms_used_counts: fit.residual_rms,
+        bias_fit_rms_used_counts: rms_used,
         bias_fit_rms_ng: all * resolution,
-        bias_fit_rms_used_ng: fit.residual_rms * resolution,
+        bias_fit_rms_used_ng: rms_used * resolution,
         measurements: count,
-        degrees_of_freedom: fit.degrees_of_freedom,
+        quiet_measurements: quiet.len(),
+        quiet_fit_rms: (!quiet.is_empty()).then_some([quiet_rms, quiet_rms * resolution]),
+        degrees_of_freedom,
         statistical_ng,
         fitted_sigma_ng: sigmas.iter().sum::<f64>() / sigmas.len().max(1) as f64 * resolution,
         total_ng: accuracy::quadrature(&[statistical_ng, calibration.systematic_bias_ng]),

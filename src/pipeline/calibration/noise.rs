@@ -15,6 +15,8 @@ use crate::units::Clock;
 const LAG_CELLS: i64 = 3;
 /// Cells between the windows of a slope: 300 s.
 const SLOPE_CELLS: i64 = 12;
+/// Cells remembered: more than the longest lag.
+const RING: usize = 16;
 /// Second differences for which the factor configured counts.
 const PRIOR_DIFFERENCES: f64 = 60.0;
 /// A difference counts no more than this many variances: windows disturbed by bursts say nothing of the rest.
@@ -62,9 +64,13 @@ impl NoiseHistory {
     /// Sums over all whole windows of normal mode.
     pub fn new(windows: &BTreeMap<i64, Window>, resolution_ng: &[[f64; 3]; 3]) -> Self {
         let mut sums = [Sums::default(); 3];
-        let mut entries = Vec::with_capacity(windows.len());
-        let whole = |cell: i64| windows.get(&cell).filter(|w| w.quality == Quality::GOOD);
-        for cell in windows.keys() {
+        let mut entries = Vec::new();
+        // The windows of the last cells, by the cell's remainder: looking them up in the map again and again costs the most.
+        let mut ring: [(i64, Option<&Window>); RING] = [(i64::MIN, None); RING];
+        let place = |cell: i64| cell.rem_euclid(RING as i64) as usize;
+        for (cell, window) in windows {
+            ring[place(*cell)] = (*cell, Some(window).filter(|w| w.quality == Quality::GOOD));
+            let whole = |cell: i64| Some(ring[place(cell)]).filter(|(of, _)| *of == cell).and_then(|(_, w)| w);
             let (Some(last), Some(before)) = (whole(*cell), whole(cell - LAG_CELLS)) else { continue };
             for axis in 0..3 {
                 let figures = |w: &Window| {

@@ -3,12 +3,12 @@
 //! 1/SF_A = [mean(y) - MP sin(d)/d - (1 - sin(d)/d) mean(b)] / (r w^2), SF_C = SF_A / SF_N,
 //!
 //! MP the midpoint of the means before and after, d the half angular travel, w the rate, b the bias. Rate and travel come from
-//! the table packets: the rate is the slope of the angle, which is finer than the rate's own last digit.
+//! the table packets: the rate is the mean of the slope of the angle and the rate told, by the rounding of each.
 
 use std::collections::BTreeMap;
 
 use super::sequence::{Hold, next_step};
-use crate::math::robust::{TrimLaw, TrimmedMean};
+use crate::math::robust::{TrimmedMean, rounding_error_spread};
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
 use crate::telemetry::{Axis, Mode, Range, Step, TableReport};
 use crate::units::{Clock, NANO_G_M_S2};
@@ -21,9 +21,8 @@ const STILL_SAMPLES_MIN: usize = 200;
 const RATE_QUANTUM_RAD_S: f64 = 0.001 * std::f64::consts::PI / 180.0;
 /// Rates that differ by more than this are unsteady, rad/s.
 pub const JITTER_RAD_S: f64 = 3.0 * RATE_QUANTUM_RAD_S;
-/// A shift of the level between pre and post is one beyond so many of its errors: for Z, where it is known to happen, chance does
-/// that once in 10,000 scale calibrations; elsewhere it would be news.
-pub const SHIFT_SIGMA: [f64; 3] = [6.0, 6.0, 3.9];
+/// The noise factor, about: errors kept here are those of independent samples, and that of rounding is no such.
+const RATIO_OF_NOISE: f64 = 2.8;
 /// Seconds between the middles of the steps before and after, on average; for the drift of the signal between them.
 const PRE_TO_POST_S: f64 = 100.0;
 
@@ -82,6 +81,8 @@ pub struct ScaleSequence {
     pub jitter_rad_s: f64,
     /// Half angular travel, rad.
     pub half_travel_rad: f64,
+    /// Variance of half the signal's change over 75 s beyond the usual, squared counts: a manoeuvre.
+    pub excess_counts2: f64,
     /// Why it cannot be used.
     pub refusal: Option<Refusal>,
 }
@@ -137,8 +138,10 @@ impl ScaleSequence {
         if !(span_counts > 0.0) {
             return None;
         }
-        let noise =
-            (factor * self.rate[1]).powi(2) + (factor * s * midpoint_se).powi(2) + ((1.0 - s) * bias[1]).powi(2);
+        let noise = (factor * self.rate[1]).powi(2)
+            + (factor * s * midpoint_se).powi(2)
+            + ((1.0 - s) * bias[1]).powi(2)
+            + self.excess_counts2;
         let relative = (noise.sqrt() / span_counts).hypot(2.0 * self.rate_rad_s[1] / self.rate_rad_s[0]);
         let correction = actual / resolution_ng;
         Some(ScaleMeasurement { correction, sigma: correction * relative })
@@ -146,7 +149,9 @@ impl ScaleSequence {
 
     /// Post less pre, counts, and its standard error.
     pub fn shift(&self, factor: f64, half_drift_variance_counts2: f64) -> [f64; 2] {
-        let drift = half_drift_variance_counts2 * (2.0 * PRE_TO_POST_S / 75.0).powi(2);
+        // The usual signal changes like a line, a manoeuvre like a walk.
+        let usual = half_drift_variance_counts2 * (2.0 * PRE_TO_POST_S / 75.0).powi(2);
+        let drift = usual + self.excess_counts2 * 4.0 * PRE_TO_POST_S / 75.0;
         [self.post[0] - self.pre[0], ((factor * self.pre[1]).powi(2) + (factor * self.post[1]).powi(2) + drift).sqrt()]
     }
 }
@@ -157,7 +162,7 @@ fn axis_of(target: u8) -> Option<Axis> {
 }
 
 /// Every scale sequence in the archive, usable or not, in order of time.
-pub fn sequences(archive: &Archive, holds: &[Hold<'_>], law: &TrimLaw) -> Vec<ScaleSequence> {
+pub fn sequences(archive: &Archive, holds: &[Hold<'_>]) -> Vec<ScaleSequence> {
     let table: BTreeMap<i64, &TableReport> = if holds.iter().any(|hold| hold.mode() == Mode::Scale) {
         archive
             .table()
@@ -169,7 +174,7 @@ pub fn sequences(archive: &Archive, holds: &[Hold<'_>], law: &TrimLaw) -> Vec<Sc
     };
     (0..holds.len())
         .filter(|place| holds[*place].mode() == Mode::Scale && holds[*place].step() == Step::PreRate)
-        .filter_map(|place| sequence(archive, holds, place, &table, law))
+        .filter_map(|place| sequence(archive, holds, place, &table))
         .collect()
 }
 
@@ -178,7 +183,6 @@ fn sequence(
     holds: &[Hold<'_>],
     place: usize,
     table: &BTreeMap<i64, &TableReport>,
-    law: &TrimLaw,
 ) -> Option<ScaleSequence> {
     let pre = &holds[place];
     let axis = axis_of(pre.target())?;
@@ -199,14 +203,18 @@ fn sequence(
         rate_rad_s: [0.0; 2],
         jitter_rad_s: 0.0,
         half_travel_rad: 0.0,
+        excess_counts2: 0.0,
         refusal: None,
     };
     let (Some(rate), Some(post)) = (rate, post) else {
         found.refusal = Some(if ends_in_normal(archive, end) { Refusal::Aborted } else { Refusal::Gap });
         return Some(found);
     };
-    let figures = |mean: TrimmedMean| [mean.mean, mean.independent_standard_error()];
-    let mean = |hold: &Hold<'_>, least: usize| hold.plain_mean(axis, law, least).map(figures);
+    let figures = |mean: TrimmedMean| {
+        let rounding = rounding_error_spread(mean.winsorised_sd);
+        [mean.mean, mean.independent_standard_error_of_spread().hypot(rounding / RATIO_OF_NOISE)]
+    };
+    let mean = |hold: &Hold<'_>, least: usize| hold.mean(axis, least).map(figures);
     let means = (mean(pre, STILL_SAMPLES_MIN), mean(rate, RATE_SAMPLES_MIN), mean(post, STILL_SAMPLES_MIN));
     let (Some(a), Some(b), Some(c)) = means else {
         found.refusal = Some(Refusal::Gap);
@@ -232,7 +240,8 @@ fn read_table(found: &mut ScaleSequence, rate: &Hold<'_>, table: &BTreeMap<i64, 
         .filter(|(_, report)| report.target == rate.target())
         .map(|(tenths, report)| ((tenths - from) as f64 / 10.0, *report))
         .collect();
-    let missing_records = (rate.records.len() as i64) < seconds;
+    // Lost frames take science records and table packets alike; where nearly all of the first are there, the others were bad.
+    let missing_records = (rate.records.len() as i64) * 5 < seconds * 4;
     if reports.len() < 3 || (reports.len() as i64) * 2 < seconds {
         found.refusal = Some(if missing_records { Refusal::Gap } else { Refusal::TablePackets });
         return;
@@ -244,10 +253,16 @@ fn read_table(found: &mut ScaleSequence, rate: &Hold<'_>, table: &BTreeMap<i64, 
     let slope = reports.iter().map(|(t, r)| (t - mean_t) * (r.angle_rad - mean_angle)).sum::<f64>() / tt;
     let mean_rate = reports.iter().map(|(_, r)| r.rate_rad_s).sum::<f64>() / count;
     let spread = reports.iter().map(|(_, r)| (r.rate_rad_s - mean_rate).powi(2)).sum::<f64>() / count;
-    let angle_quantum = 0.01f64.to_radians() / 12f64.sqrt();
+    // The slope of the angle and the rate told, each with the rounding of its last digit; that of a steady rate is the same in
+    // every report.
+    let slope_sigma = 0.01f64.to_radians() / 12f64.sqrt() / tt.sqrt();
+    let told_sigma = RATE_QUANTUM_RAD_S / 12f64.sqrt();
+    let weights = [slope_sigma.powi(-2), told_sigma.powi(-2)];
+    let rate_told = (slope.abs() * weights[0] + mean_rate.abs() * weights[1]) / (weights[0] + weights[1]);
+    let rounding = (weights[0] + weights[1]).powf(-0.5);
     found.calibration_id = Some(reports[0].1.calibration_id);
     found.jitter_rad_s = spread.sqrt();
-    found.rate_rad_s = [slope.abs(), (angle_quantum / tt.sqrt()).hypot(spread.sqrt() / count.sqrt())];
+    found.rate_rad_s = [rate_told, rounding.hypot((spread - told_sigma.powi(2)).max(0.0).sqrt() / count.sqrt())];
     found.half_travel_rad = 0.5 * slope.abs() * seconds as f64;
     let largest = reports.iter().map(|(_, r)| (r.rate_rad_s - mean_rate).abs()).fold(0.0, f64::max);
     if largest > JITTER_RAD_S {

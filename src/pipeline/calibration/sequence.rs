@@ -1,11 +1,12 @@
 //! The steps of the calibration sequences, cut out of the records: runs of seconds in one mode, target, step and range.
 
-use std::cell::OnceCell;
+use std::collections::{BTreeMap, HashMap};
+use std::hash::{DefaultHasher, Hash, Hasher};
 
-use crate::math::robust::{TrimLaw, TrimmedMean, trimmed_mean_of};
+use crate::math::robust::{TrimLaw, TrimmedMean, spread_counts, trimmed_mean_of_values};
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
 use crate::pipeline::window::Window;
-use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, SAMPLES_PER_RECORD, Step};
+use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, Step};
 use crate::units::Clock;
 
 /// Two records of one step are no further apart than this, tenths of a second: lost seconds do not end a step.
@@ -18,9 +19,14 @@ const NEXT_TENTHS_MAX: i64 = 600;
 pub struct Hold<'a> {
     /// Its seconds, in order.
     pub records: Vec<&'a AccRecord>,
-    /// The estimates of its samples as they are, made once: every version of the calibration asks for them.
-    plain: [OnceCell<Option<TrimmedMean>>; 3],
+    /// Hash of them.
+    pub digest: u64,
+    /// Adaptive trimmed means of the axes, counts spread over their width; None without a sample.
+    pub means: Means,
 }
+
+/// Means of X, Y, Z.
+pub type Means = [Option<TrimmedMean>; 3];
 
 impl Hold<'_> {
     fn first(&self) -> &AccRecord {
@@ -67,48 +73,65 @@ impl Hold<'_> {
         self.records.iter().map(|r| f64::from(r.temperature_c)).sum::<f64>() / self.records.len() as f64
     }
 
-    /// Samples of an axis that are not at the rail, each with its seconds since the start of the step.
-    pub fn samples(&self, axis: Axis) -> impl Iterator<Item = (f64, i16)> + '_ {
+    /// Samples of an axis that are not at the rail, each with its tenths of a second since the start of the step.
+    pub fn samples(&self, axis: Axis) -> impl Iterator<Item = (u16, i16)> + '_ {
         let start = self.start().tenths();
         self.records.iter().flat_map(move |record| {
             record.counts.iter().enumerate().filter_map(move |(n, sample)| {
                 let count = sample[axis.index()];
                 let tenths = record.clock.tenths() - start + n as i64;
-                (!AccRecord::is_at_rail(count)).then_some((tenths as f64 / 10.0, count))
+                (!AccRecord::is_at_rail(count)).then_some((tenths as u16, count))
             })
         })
     }
 
-    /// The adaptive trimmed mean of an axis after taking a transient away; None of fewer than `samples_min` samples.
-    pub fn mean(
+    /// The adaptive trimmed mean of an axis; None of fewer than `samples_min` samples.
+    pub fn mean(&self, axis: Axis, samples_min: usize) -> Option<TrimmedMean> {
+        self.means[axis.index()].filter(|mean| mean.points >= samples_min)
+    }
+
+    /// The same after taking a transient away, or nothing.
+    pub fn mean_without(
         &self,
         axis: Axis,
         law: &TrimLaw,
         samples_min: usize,
-        transient: impl Fn(f64) -> f64,
+        transient: Option<&dyn Fn(f64) -> f64>,
     ) -> Option<TrimmedMean> {
-        let counts: Vec<i16> =
-            self.samples(axis).map(|(t_s, count)| (f64::from(count) - transient(t_s)).round() as i16).collect();
-        if counts.len() < samples_min {
+        let mut samples: Vec<(i16, u16)> = Vec::with_capacity(500);
+        samples.extend(self.samples(axis).map(|(tenths, count)| (count, tenths)));
+        if samples.len() < samples_min {
             return None;
         }
-        trimmed_mean_of(counts, law)
+        samples.sort_unstable();
+        let counts: Vec<i16> = samples.iter().map(|(count, _)| *count).collect();
+        let mut values = spread_counts(&counts);
+        if let Some(transient) = transient {
+            let after = |tenths: u16| transient(f64::from(tenths) / 10.0);
+            values.iter_mut().zip(&samples).for_each(|(value, (_, tenths))| *value -= after(*tenths));
+            values.sort_unstable_by(f64::total_cmp);
+        }
+        trimmed_mean_of_values(&values, law)
     }
 
-    /// As [`Hold::mean`], of the samples as they are. All calls must use the same law.
-    pub fn plain_mean(&self, axis: Axis, law: &TrimLaw, samples_min: usize) -> Option<TrimmedMean> {
-        let estimate = self.plain[axis.index()].get_or_init(|| self.mean(axis, law, 1, |_| 0.0));
-        estimate.filter(|estimate| estimate.points >= samples_min)
-    }
-
-    /// Whether seconds or samples are missing that the step should have.
-    pub fn is_cut(&self, seconds: usize) -> bool {
-        self.records.len() < seconds || self.records.len() * SAMPLES_PER_RECORD < seconds * SAMPLES_PER_RECORD
+    fn digest(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        for record in &self.records {
+            (record.clock, record.counts.as_flattened(), record.temperature_c.to_bits(), record.ranges, record.quiet)
+                .hash(&mut hasher);
+        }
+        hasher.finish()
     }
 }
 
-/// All holds in the archive in order of time. Only windows in which the table was at work are looked at.
-pub fn holds<'a>(archive: &'a Archive, windows: &std::collections::BTreeMap<i64, Window>) -> Vec<Hold<'a>> {
+/// All holds in the archive in order of time. Only windows in which the table was at work are looked at. `kept` holds means by
+/// digest and saves their making.
+pub fn holds<'a>(
+    archive: &'a Archive,
+    windows: &BTreeMap<i64, Window>,
+    law: &TrimLaw,
+    kept: Option<&HashMap<u64, Means>>,
+) -> Vec<Hold<'a>> {
     let mut cells: Vec<i64> = windows
         .iter()
         .filter(|(_, window)| window.quality.contains(Quality::TABLE_MOVING))
@@ -128,9 +151,17 @@ pub fn holds<'a>(archive: &'a Archive, windows: &std::collections::BTreeMap<i64,
         }
         match holds.last_mut() {
             Some(hold) if open && continues(hold, record) => hold.records.push(record),
-            _ => holds.push(Hold { records: vec![record], plain: Default::default() }),
+            _ => holds.push(Hold { records: vec![record], digest: 0, means: [None; 3] }),
         }
         open = true;
+    }
+    for hold in &mut holds {
+        hold.digest = hold.digest();
+        let known = kept.and_then(|kept| kept.get(&hold.digest));
+        hold.means = match known {
+            Some(means) => *means,
+            None => Axis::ALL.map(|axis| hold.mean_without(axis, law, 1, None)),
+        };
     }
     holds
 }

@@ -188,8 +188,8 @@ fn skew(transient: &Transient, holds: &[&Hold<'_>], axis: Axis, law: &TrimLaw, s
     let skews: Vec<f64> = holds
         .iter()
         .filter_map(|hold| {
-            let raw = hold.plain_mean(axis, law, samples_min)?;
-            let freed = hold.mean(axis, law, samples_min, |t_s| transient.counts(t_s))?;
+            let raw = hold.mean(axis, samples_min)?;
+            let freed = hold.mean_without(axis, law, samples_min, Some(&|t_s| transient.counts(t_s)))?;
             Some(0.5 * (raw.mean - freed.mean))
         })
         .collect();

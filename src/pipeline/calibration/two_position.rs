@@ -5,6 +5,7 @@
 
 use super::sequence::{Hold, next_step};
 use super::settling::Transient;
+use crate::math::robust::{TrimmedMean, rounding_error_spread};
 use crate::pipeline::settings::Settings;
 use crate::telemetry::{Axis, Mode, Range, Step};
 use crate::units::Clock;
@@ -37,6 +38,8 @@ pub struct BiasMeasurement {
     pub trim: [f64; 2],
     /// Quiet was asserted throughout.
     pub quiet: bool,
+    /// The signal changed between the positions by more than the noise: a manoeuvre, as a rule.
+    pub unsteady: bool,
     /// Whether the law uses it; a weight of 0 is an outlier.
     pub weight: f64,
     /// Measured less fitted, in its own error, by the law of all others.
@@ -57,6 +60,8 @@ pub struct Pair<'h, 'a> {
     pub normal: &'h Hold<'a>,
     /// At 180 deg.
     pub opposite: &'h Hold<'a>,
+    /// Variance of half the signal's change between the positions beyond the usual, ng^2, by axis: a manoeuvre.
+    pub excess_ng2: [f64; 3],
 }
 
 /// All pairs in order of time.
@@ -66,7 +71,7 @@ pub fn pairs<'h, 'a>(holds: &'h [Hold<'a>]) -> Vec<Pair<'h, 'a>> {
         .filter_map(|place| {
             let opposite = next_step(holds, place, Step::Opposite)?;
             let apart = opposite.start().tenths() - holds[place].start().tenths();
-            (apart < SEQUENCE_TENTHS_MAX).then_some(Pair { normal: &holds[place], opposite })
+            (apart < SEQUENCE_TENTHS_MAX).then_some(Pair { normal: &holds[place], opposite, excess_ng2: [0.0; 3] })
         })
         .collect()
 }
@@ -97,17 +102,18 @@ impl Pair<'_, '_> {
         settings: &Settings,
     ) -> Option<BiasMeasurement> {
         let (law, least) = (&settings.window.trim, settings.window.samples_min);
-        let at_zero = self.normal.plain_mean(axis, law, least)?;
-        let raw = self.opposite.plain_mean(axis, law, least)?;
+        let at_zero = self.normal.mean(axis, least)?;
+        let raw = self.opposite.mean(axis, least)?;
         let freed = match transient {
-            Some(transient) => self.opposite.mean(axis, law, least, |t_s| transient.counts(t_s))?,
+            Some(transient) => self.opposite.mean_without(axis, law, least, Some(&|t_s| transient.counts(t_s)))?,
             None => raw,
         };
-        let error = |mean: &crate::math::robust::TrimmedMean| {
-            // A quantised window with next to no scatter still does not know its mean better than this.
-            factor * mean.independent_standard_error().hypot(0.02 / (1.0 + mean.winsorised_sd))
+        let error = |mean: &TrimmedMean| {
+            (factor * mean.independent_standard_error_of_spread()).hypot(rounding_error_spread(mean.winsorised_sd))
         };
         let noise = 0.25 * (error(&at_zero).powi(2) + error(&freed).powi(2));
+        let resolution = settings.instrument.resolution_ng(axis, self.normal.range(axis));
+        let excess = self.excess_ng2[axis.index()] / (resolution * resolution);
         let count = (self.normal.records.len() + self.opposite.records.len()) as f64;
         let records = || self.normal.records.iter().chain(&self.opposite.records);
         Some(BiasMeasurement {
@@ -116,7 +122,8 @@ impl Pair<'_, '_> {
             target: self.normal.target(),
             clock_s: 0.5 * (self.normal.start().seconds() + self.opposite.last().seconds() + 1.0),
             counts: 0.5 * (at_zero.mean + freed.mean),
-            sigma_counts: (noise + half_drift_counts2).sqrt(),
+            sigma_counts: (noise + half_drift_counts2 + excess).sqrt(),
+            unsteady: excess > noise,
             temperature_c: records().map(|r| f64::from(r.temperature_c)).sum::<f64>() / count,
             known_since: self.opposite.last(),
             settling_counts: 0.5 * (raw.mean - freed.mean),

@@ -1,9 +1,10 @@
 //! One version of the calibration: everything that the telemetry up to some instrument clock supports, and nothing later.
 
+use super::anomaly::shift_sigma;
 use super::apply::{Bias, Calibration, Provenance, Scale};
 use super::bias_law::{Expectation, Point, fit};
 use super::noise::NoiseFactors;
-use super::scale_factor::{SHIFT_SIGMA, ScaleMeasurement, ScaleSequence, combine};
+use super::scale_factor::{ScaleMeasurement, ScaleSequence, combine};
 use super::settling::{self, Transient};
 use super::two_position::{BiasMeasurement, Pair};
 use crate::pipeline::settings::Settings;
@@ -214,6 +215,6 @@ fn shift(known: &[&ScaleSequence], axis: Axis, noise: &NoiseFactors, settings: &
         counts,
         sigma_counts: weight.powf(-0.5),
         sequences: shifts.len(),
-        threshold_sigma: SHIFT_SIGMA[axis.index()],
+        threshold_sigma: shift_sigma(shifts.len()),
     }
 }

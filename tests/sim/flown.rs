@@ -1,0 +1,65 @@
+//! Missions flown into the pure core, without the wire between, and what is asked of them again and again.
+
+use std::collections::BTreeMap;
+
+use oare_ground::pipeline::archive::Archive;
+use oare_ground::pipeline::calibration::{self, Derived};
+use oare_ground::pipeline::window::{Window, windows};
+use oare_ground::pipeline::{Product, Settings, derive};
+use oare_ground::simulate::truth::{TrueWindow, TruthBuilder};
+use oare_ground::simulate::{Mission, MissionConfig};
+
+/// A mission's windows, what is derived from them, and the truth.
+pub struct Flown {
+    /// Windows.
+    pub windows: BTreeMap<i64, Window>,
+    /// What was derived.
+    pub derived: Derived,
+    /// True windows, by the clock of their start, s.
+    pub truth: BTreeMap<u32, TrueWindow>,
+    /// The mission.
+    pub mission: Mission,
+}
+
+impl Flown {
+    /// The products.
+    pub fn products(&self) -> impl Iterator<Item = Product> {
+        let (settings, derived) = (Settings::sts65(), &self.derived);
+        self.windows
+            .values()
+            .map(move |window| derive::product(window, derived.current(), &derived.range_corrections, &settings.window))
+    }
+}
+
+/// Flies a mission.
+pub fn fly(config: MissionConfig) -> Flown {
+    let mission = Mission::new(config).unwrap_or_else(|problems| panic!("{problems:?}"));
+    let settings = Settings::sts65();
+    let (mut archive, mut builder, mut truth) = (Archive::default(), TruthBuilder::default(), BTreeMap::new());
+    let mut sequence = 0u16;
+    for second in mission.fly() {
+        truth.extend(builder.take(&second).map(|window| (window.start_clock_s, window)));
+        for sent in second.sent.iter().filter(|sent| sent.damage.is_none()) {
+            archive.add(sent.record.clone(), sequence);
+            sequence = sequence.wrapping_add(1) & 0x3fff;
+        }
+    }
+    let mut held = BTreeMap::new();
+    let cells: Vec<i64> = archive.cells().collect();
+    windows(&archive, cells, &settings.window, |cell, window| {
+        if let Some(window) = window {
+            held.insert(cell, window);
+        }
+    });
+    let derived = calibration::derive(&archive, &held, &settings, None, None);
+    Flown { windows: held, derived, truth, mission }
+}
+
+/// How many seeds: a part by default, the whole with `OARE_SEEDS=all`, any number with that number.
+#[cfg(feature = "slow")]
+pub fn seeds(whole: u64, part: u64) -> u64 {
+    match std::env::var("OARE_SEEDS") {
+        Ok(number) => number.parse().unwrap_or(whole),
+        Err(_) => part,
+    }
+}
