@@ -258,7 +258,7 @@ fn an_orbit_that_cannot_be_used_is_refused_with_its_place() {
         format!("eop.csv: Earth orientation covers MJD {} to {}, and MJD 58211.833 is needed", day(1), day(2))
     );
     let bad = eop.replacen("0.31", "north", 1);
-    assert!(said(&sp3, &bad, &gfc).starts_with("eop.csv, line "), "{}", said(&sp3, &bad, &gfc));
+    assert!(said(&sp3, &bad, &gfc).starts_with("eop.csv: line "), "{}", said(&sp3, &bad, &gfc));
     assert!(said(&sp3, lines[0], &gfc).starts_with("eop.csv: Earth orientation has 0 days"));
     // A day missing in the middle of the table.
     let holed: Vec<&str> = lines.iter().enumerate().filter(|(i, _)| ![4, 5].contains(i)).map(|(_, l)| *l).collect();
