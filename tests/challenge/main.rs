@@ -57,7 +57,7 @@ fn the_table_of_nulls_agrees_with_the_bootstrap() {
                 .collect::<Vec<f64>>()
         })
         .collect();
-    for level in [0.5, 0.1, 0.03] {
+    for level in [0.5, 0.25, 0.1, 0.03] {
         let reached = probabilities.iter().filter(|p| **p <= level).count();
         println!("table says {level}: {reached} of {} replicates", probabilities.len());
         // More than four binomial standard deviations above what the table says would be alarms it does not own up to.
