@@ -234,7 +234,7 @@ pub struct Found {
 }
 
 /// Forward search from the parts the simulation has. A part may be needed only together with another (scale factors
-/// show little while the axes' angles are wrong), so pairs are tried when no single part convinces.
+/// show little while the axes' angles are wrong), so pairs and then all together are tried when nothing smaller convinces.
 pub fn search(included: &[Part], poses: &[Pose], gravity: f64) -> Found {
     let mut fits = vec![fit(included, poses, gravity)];
     let mut added: Vec<(Part, f64)> = Vec::new();
@@ -242,17 +242,13 @@ pub fn search(included: &[Part], poses: &[Pose], gravity: f64) -> Found {
         let now = &fits[fits.len() - 1];
         let open: Vec<Part> = Part::ALL.into_iter().filter(|p| !now.parts.contains(p)).collect();
         let mut best: (f64, Vec<Part>) = (0.0, Vec::new());
-        let mut sets: Vec<Vec<Part>> = open.iter().map(|p| vec![*p]).collect();
-        if open.len() == 2 {
-            sets.push(open.clone());
-        }
-        for set in sets {
+        for set in subsets(&open) {
             let parts: Vec<Part> = now.parts.iter().chain(&set).copied().collect();
             if poses.len() < 1 + parts.iter().map(|p| p.unknowns()).sum::<usize>() + SPARE_POSES {
                 continue;
             }
             let score = evidence(now, &fit(&parts, poses, gravity), &set);
-            if score > best.0 && (set.len() == 1 || best.0 < SCORE_MIN) {
+            if score > best.0 && (best.0 < SCORE_MIN || set.len() == best.1.len()) {
                 best = (score, set);
             }
         }
@@ -266,6 +262,14 @@ pub fn search(included: &[Part], poses: &[Pose], gravity: f64) -> Found {
             fits.push(fit(&parts, poses, gravity));
         }
     }
+}
+
+/// All choices of one or more parts, smaller ones first.
+fn subsets(parts: &[Part]) -> Vec<Vec<Part>> {
+    let chosen = |mask: u32| parts.iter().enumerate().filter(move |(i, _)| mask >> i & 1 == 1).map(|(_, part)| *part);
+    let mut sets: Vec<Vec<Part>> = (1..1 << parts.len()).map(|mask| chosen(mask).collect()).collect();
+    sets.sort_by_key(Vec::len);
+    sets
 }
 
 fn evidence(before: &Triad, after: &Triad, set: &[Part]) -> f64 {
