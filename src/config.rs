@@ -1,16 +1,19 @@
 //! Configuration: a TOML text in, checked values out, every fault told at once with its place and its value.
 //!
-//! Every key has a default, so an empty text is a whole configuration (STS-65, loopback only). Reading files is the caller's.
+//! Every key has a default, so an empty text is a whole configuration (STS-65, loopback only). Reading the configuration file is the
+//! caller's; files it names are looked for here, so that a wrong path is among the faults, and read by [`diagnosis`].
 
+pub mod diagnosis;
 mod section;
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use crate::ingest::wire::LinkConfig;
 use crate::pipeline::settings::Settings;
+pub use diagnosis::DiagnosisConfig;
 use section::Section;
 
 /// Everything the service must be told, checked.
@@ -26,6 +29,8 @@ pub struct Config {
     pub data_dir: PathBuf,
     /// Whether an MCAP recording is written as the data come in.
     pub recording: bool,
+    /// What the recording is compared with as it comes in, if with anything.
+    pub diagnosis: Option<DiagnosisConfig>,
 }
 
 /// The port for dumps.
@@ -95,6 +100,14 @@ impl Config {
     /// # Errors
     /// Every fault at once.
     pub fn from_toml(text: &str) -> Result<Self, ConfigFaults> {
+        Self::from_toml_in(text, Path::new(""))
+    }
+
+    /// Reads and checks a configuration whose relative paths start in a folder: that of its file.
+    ///
+    /// # Errors
+    /// Every fault at once.
+    pub fn from_toml_in(text: &str, folder: &Path) -> Result<Self, ConfigFaults> {
         let table: toml::Table = match text.parse() {
             Ok(table) => table,
             Err(error) => {
@@ -111,8 +124,9 @@ impl Config {
             let dir = section.text("data").map_or_else(default_data_dir, PathBuf::from);
             (dir, section.flag("recording", true))
         });
+        let diagnosis = root.section("diagnosis", |section| diagnosis::read(section, folder));
         root.finish();
-        let config = Self { settings, ingest, http, data_dir, recording };
+        let config = Self { settings, ingest, http, data_dir, recording, diagnosis };
         faults.extend(config.exposure_faults());
         if faults.is_empty() { Ok(config) } else { Err(ConfigFaults(faults)) }
     }
@@ -258,6 +272,10 @@ mod tests {
             [http]
             address = "0.0.0.0:80"
             tokn = "secret"
+            [diagnosis]
+            simulation = "no/simulation.csv"
+            claim_probability = 2
+            without = ["drag"]
         "#;
         let faults = Config::from_toml(text).unwrap_err();
         let places: Vec<&str> = faults.0.iter().map(|fault| fault.place.as_str()).collect();
@@ -268,12 +286,17 @@ mod tests {
             "ingest.allow",
             "ingest.idle_timeout_s",
             "http.tokn",
+            "diagnosis.simulation",
+            "diagnosis.ancillary",
+            "diagnosis.claim_probability",
+            "diagnosis.without",
             "speling",
             "http.address",
         ];
         assert_eq!(places, expected);
         let told = faults.to_string();
-        for value in ["\"yesterday\"", "4000", "\"x\"", "-1", "\"ten\"", "0.0.0.0:80"] {
+        for value in ["\"yesterday\"", "4000", "\"x\"", "-1", "\"ten\"", "0.0.0.0:80", "no/simulation.csv", "\"drag\""]
+        {
             assert!(told.contains(value), "{value} is not in: {told}");
         }
     }

@@ -4,6 +4,7 @@
 //! messages of every topic in memory, all others as references (see [`journal`]), so a slow reader costs nothing but its own
 //! wait, and is told what it missed. One hub serves one mission and spacecraft, whose ids stand in every key of its store.
 
+pub mod desk;
 pub mod journal;
 mod message;
 mod reader;
@@ -12,7 +13,7 @@ pub mod told;
 pub mod wire;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
-use std::sync::{Arc, RwLock};
+use std::sync::{Arc, Mutex, RwLock};
 use std::time::Instant;
 
 use tokio::sync::watch;
@@ -29,6 +30,9 @@ use told::Told;
 const PUBLISHED_AT_ONCE: usize = 512;
 /// Entries of the journal kept; a reader that asks for older ones is told what it missed.
 const JOURNAL_ENTRIES_MAX: usize = 1 << 18;
+
+/// Messages of others than the one writer that wait for it.
+const WAITING_MAX: usize = 64;
 
 /// Where raw samples are read again.
 pub trait SampleSource: Send + Sync {
@@ -84,6 +88,8 @@ pub struct Hub {
     state: RwLock<State>,
     latest: RwLock<Option<Latest>>,
     head: watch::Sender<u64>,
+    /// What others than the one writer have to tell.
+    waiting: Mutex<VecDeque<Body>>,
     samples: Arc<dyn SampleSource>,
 }
 
@@ -122,6 +128,7 @@ impl Hub {
             state: RwLock::default(),
             latest: RwLock::default(),
             head: watch::Sender::new(0),
+            waiting: Mutex::default(),
             samples,
         }
     }
@@ -205,6 +212,35 @@ impl Hub {
             journaled.entries.extend(entries);
         }
         journaled
+    }
+
+    /// Leaves something for the one writer to publish. When it is slow, the oldest of what waits gives way: newer news of the same
+    /// kind stand for it.
+    pub fn tell(&self, body: Body) {
+        let mut waiting = self.waiting.lock().expect("no holder panics");
+        if waiting.len() == WAITING_MAX {
+            waiting.pop_front();
+        }
+        waiting.push_back(body);
+    }
+
+    /// What was left to be published.
+    pub fn take_waiting(&self) -> Vec<Body> {
+        self.waiting.lock().expect("no holder panics").drain(..).collect()
+    }
+
+    /// The number of the last message, as it changes: a slot that holds the latest only.
+    pub fn subscribe(&self) -> watch::Receiver<u64> {
+        self.head.subscribe()
+    }
+
+    /// The JSON members of the last message on a topic that is told whole.
+    pub fn last_told(&self, wanted: Topic) -> Option<String> {
+        let state = self.state.read().expect("no holder panics");
+        state.journal.iter().rev().find_map(|entry| match &**entry {
+            Entry::Told { topic, json, .. } if *topic == wanted => Some(json.clone()),
+            _ => None,
+        })
     }
 
     /// The revision of a window that was told last.

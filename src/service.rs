@@ -1,5 +1,7 @@
 //! The service, wired together from start to drain: ports, raw log, station, hub, API, recording.
 
+pub mod diagnosing;
+
 use std::io;
 use std::net::SocketAddr;
 use std::sync::{Arc, RwLock};
@@ -8,17 +10,22 @@ use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, mpsc};
 use tokio::task::JoinHandle;
-use tokio_util::sync::CancellationToken;
+use tokio_util::sync::{CancellationToken, DropGuard};
 
 use crate::api::{self, App, Metrics};
 use crate::config::{Config, ConfigFaults};
+use crate::diagnose::case::Expectation;
+use crate::diagnose::live::Report;
 use crate::hub::Hub;
+use crate::hub::desk::Desk;
 use crate::hub::status::{Board, Phase};
 use crate::ingest::listener::{self, QUEUED_READS_MAX, Rules};
 use crate::ingest::raw_log::{RawLog, StoreError};
 use crate::ingest::writer::{SharedStation, StationSamples, Writer};
 use crate::pipeline::Station;
 use crate::record::{RecordError, recorder};
+
+use diagnosing::{Diagnosing, Gate};
 
 /// HTTP requests under way have this long to end after the drain.
 const HTTP_PATIENCE: Duration = Duration::from_secs(5);
@@ -36,9 +43,9 @@ pub enum ServiceError {
         /// What the system says.
         source: io::Error,
     },
-    /// An address that nothing protects.
+    /// An address that nothing protects, or files of the diagnosis that cannot be used.
     #[error(transparent)]
-    Exposed(#[from] ConfigFaults),
+    Config(#[from] ConfigFaults),
     /// The raw log.
     #[error(transparent)]
     Store(#[from] StoreError),
@@ -72,6 +79,7 @@ pub struct Service {
     writing: JoinHandle<Result<(), StoreError>>,
     recording: Option<(CancellationToken, JoinHandle<Result<(), RecordError>>)>,
     serving: JoinHandle<io::Result<()>>,
+    diagnosing: Option<(DropGuard, JoinHandle<()>)>,
     drain_timeout: Duration,
 }
 
@@ -86,10 +94,15 @@ impl Service {
     /// # Errors
     /// When a port is busy, the configuration exposes the service, or the store cannot be used.
     pub async fn start(config: Config) -> Result<Self, ServiceError> {
-        let exposed = config.exposure_faults();
-        if !exposed.is_empty() {
-            return Err(ConfigFaults(exposed).into());
-        }
+        Self::start_gated(config, Arc::new(|| {})).await
+    }
+
+    /// As [`Service::start`], with something that every search of the running diagnosis must pass first.
+    ///
+    /// # Errors
+    /// As [`Service::start`].
+    pub async fn start_gated(config: Config, gate: Gate) -> Result<Self, ServiceError> {
+        let expected = checked(&config)?;
         let ingest = bind(config.ingest.address, "dumps").await?;
         let http = bind(config.http.address, "HTTP").await?;
         let address_of = |listener: &TcpListener| listener.local_addr().map_err(ServiceError::Http);
@@ -101,10 +114,15 @@ impl Service {
         let queue = config.http.live_queue_messages;
         let hub = Arc::new(Hub::new(&settings.mission, settings.link.spacecraft_id, queue, samples));
         let board = Arc::new(Board::default());
+        let desk = Arc::new(Desk::default());
+        if let Some(expected) = &expected {
+            desk.show(Report::waiting(&expected.header.id));
+        }
         let closing = CancellationToken::new();
         let app = Arc::new(App {
             hub: hub.clone(),
             board: board.clone(),
+            desk: desk.clone(),
             station: station.clone(),
             mission: settings.time,
             started: Instant::now(),
@@ -131,6 +149,13 @@ impl Service {
             let (runtime, give_up) = (tokio::runtime::Handle::current(), give_up.clone());
             tokio::task::spawn_blocking(move || writer.run(&runtime, parts_out, &give_up))
         };
+        let diagnosing = expected.zip(config.diagnosis.as_ref()).map(|(expected, diagnosis)| {
+            let stop = CancellationToken::new();
+            let (station, hub, policy) = (station.clone(), hub.clone(), diagnosis.policy.clone());
+            let work = Diagnosing { station, hub, desk, expected, policy, gate, stop: stop.clone() };
+            let runtime = tokio::runtime::Handle::current();
+            (stop.drop_guard(), tokio::task::spawn_blocking(move || work.run(&runtime)))
+        });
         let rules = Rules {
             link: settings.link,
             allow: config.ingest.allow.clone(),
@@ -154,6 +179,7 @@ impl Service {
             writing,
             recording,
             serving,
+            diagnosing,
             drain_timeout,
         })
     }
@@ -165,6 +191,15 @@ impl Service {
     pub async fn drain(self) -> Result<(), ServiceError> {
         self.board.enter(Phase::Draining);
         self.drain.cancel();
+        if let Some((stop, diagnosing)) = self.diagnosing {
+            drop(stop);
+            // Neither its pace nor a panic there is one of the products'.
+            match tokio::time::timeout(HTTP_PATIENCE, diagnosing).await {
+                Ok(Ok(())) => {}
+                Ok(Err(error)) => tracing::error!(%error, "the running diagnosis broke off"),
+                Err(_) => tracing::warn!("the search under way did not end in time"),
+            }
+        }
         let give_up = self.give_up.clone();
         let patience = self.drain_timeout + HTTP_PATIENCE;
         let hurry = tokio::spawn(async move {
@@ -189,6 +224,20 @@ impl Service {
         written?;
         recorded?;
         Ok(())
+    }
+}
+
+/// What the running diagnosis compares with, where one is wanted; every fault of the configuration that shows only now.
+fn checked(config: &Config) -> Result<Option<Expectation>, ConfigFaults> {
+    let mut faults = config.exposure_faults();
+    let expected = config.diagnosis.as_ref().map(|diagnosis| diagnosis.expectation(&config.settings.time));
+    match expected.transpose() {
+        Ok(expected) if faults.is_empty() => Ok(expected),
+        Ok(_) => Err(ConfigFaults(faults)),
+        Err(more) => {
+            faults.extend(more);
+            Err(ConfigFaults(faults))
+        }
     }
 }
 

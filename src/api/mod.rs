@@ -26,6 +26,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::hub::Hub;
+use crate::hub::desk::Desk;
 use crate::hub::status::Board;
 use crate::ingest::writer::SharedStation;
 use crate::units::MissionTime;
@@ -38,6 +39,8 @@ pub struct App {
     pub hub: Arc<Hub>,
     /// What the service says of itself.
     pub board: Arc<Board>,
+    /// The running diagnosis.
+    pub desk: Arc<Desk>,
     /// The pipeline, for questions about the past.
     pub station: SharedStation,
     /// The mission's times.

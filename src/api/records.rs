@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::{Query, State};
+use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use utoipa::{IntoParams, ToSchema};
@@ -116,15 +117,26 @@ pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
     Json(ask(&app, told).await)
 }
 
-/// The last diagnosis put into the data directory as `diagnosis.json`.
+/// What the simulation lacks: the running diagnosis with its progress, or, where none runs, the `diagnosis.json` that lies in the
+/// data directory.
 #[utoipa::path(get, path = "/diagnosis", tag = "diagnosis",
-    responses((status = 200, description = "diagnosis.json", body = Object), (status = 404, description = "there is none")))]
-pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Json<Value>, Problem> {
+    responses((status = 200, body = Object, description = "the members of diagnosis.json; of a running diagnosis also `progress`: state \
+        (collecting, searching, current, refused), sentence, windows_seen, windows_searched, first_clock_s, last_clock_s, revision, \
+        calibration, time_to_detect_s, time_to_name_s, counted_from (onset, first_data), counted_from_clock_s, searches, alarm_clock_s, \
+        name_clock_s, name, alarms_withdrawn, looks"),
+        (status = 404, description = "there is none")))]
+pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Response, Problem> {
+    if let Some(report) = app.desk.report() {
+        return Ok(Json(&*report).into_response());
+    }
     let path = app.data_dir.join("diagnosis.json");
     let text = tokio::fs::read(&path).await.map_err(|_| {
-        Problem::not_found("there is no diagnosis: `oare diagnose CASE_DIR --out DATA/diagnosis.json` puts one here")
+        Problem::not_found(
+            "there is no diagnosis: name a simulation in the configuration's [diagnosis], or put one here with `oare diagnose \
+             CASE_DIR --out DATA/diagnosis.json`",
+        )
     })?;
-    serde_json::from_slice(&text)
-        .map(Json)
+    serde_json::from_slice::<Value>(&text)
+        .map(|value| Json(value).into_response())
         .map_err(|error| Problem::not_found(format!("diagnosis.json in the data directory is no JSON: {error}")))
 }

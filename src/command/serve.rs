@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::net::SocketAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, Result};
@@ -43,7 +43,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     super::runtime()?.block_on(async {
         let service = match Service::start(config).await {
             Ok(service) => service,
-            Err(ServiceError::Exposed(faults)) => {
+            Err(ServiceError::Config(faults)) => {
                 eprintln!("oare serve: {faults}");
                 return Ok(super::unusable());
             }
@@ -61,7 +61,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
 pub fn read_config(path: Option<PathBuf>) -> Result<Config> {
     let Some(path) = path else { return Ok(Config::standard()) };
     let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    Config::from_toml(&text).with_context(|| format!("cannot use {}", path.display()))
+    let folder = path.parent().unwrap_or(Path::new(""));
+    Config::from_toml_in(&text, folder).with_context(|| format!("cannot use {}", path.display()))
 }
 
 /// Waits for SIGTERM or Ctrl-C.

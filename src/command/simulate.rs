@@ -7,6 +7,7 @@ use std::process::ExitCode;
 use anyhow::Context as _;
 
 use oare_ground::ingest::wire::LinkConfig;
+use oare_ground::simulate::expected::case_files;
 use oare_ground::simulate::mission_file::{Overrides, from_toml};
 use oare_ground::simulate::recorder::{Framer, Packetiser};
 use oare_ground::simulate::truth::{TruthBuilder, instrument_json, truth_csv};
@@ -31,6 +32,10 @@ pub struct Args {
     /// Where to write the true accelerations, in place of beside the dump.
     #[arg(long)]
     truth: Option<PathBuf>,
+    /// Directory for what an analyst would have beside the dump: `case.toml`, simulation, ancillary data and log, for `oare
+    /// diagnose` and for the running diagnosis of `oare serve`. The simulation takes every force as nature has it.
+    #[arg(long)]
+    case: Option<PathBuf>,
 }
 
 /// Flies the mission.
@@ -73,6 +78,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let truth_path = args.truth.unwrap_or_else(|| args.out.with_extension("truth.csv"));
     write(&truth_path, truth_csv(&windows).as_bytes())?;
     write(&args.out.with_extension("instrument.json"), instrument_json(&mission).as_bytes())?;
+    if let Some(folder) = &args.case
+        && let Err(problems) = write_case(&mission, folder, &args.out)?
+    {
+        return Ok(refuse(&problems));
+    }
     println!(
         "{seconds} seconds in {} frames and {} playback(s): {} octets in {}, truth in {}",
         frames.len(),
@@ -82,6 +92,20 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         truth_path.display()
     );
     Ok(super::DONE)
+}
+
+fn write_case(mission: &Mission, folder: &Path, dump: &Path) -> anyhow::Result<Result<(), Vec<SimulateError>>> {
+    let id = folder.file_name().map_or_else(|| "simulated".into(), |name| name.to_string_lossy().into_owned());
+    let dump = fs::canonicalize(dump).with_context(|| format!("cannot find {}", dump.display()))?;
+    let files = match case_files(mission, &id, &dump.to_string_lossy()) {
+        Ok(files) => files,
+        Err(problems) => return Ok(Err(problems)),
+    };
+    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    for (name, text) in files {
+        write(&folder.join(name), text.as_bytes())?;
+    }
+    Ok(Ok(()))
 }
 
 fn refuse(problems: &[SimulateError]) -> ExitCode {

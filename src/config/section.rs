@@ -2,6 +2,7 @@
 
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
@@ -77,6 +78,28 @@ impl<'a> Section<'a> {
                 None
             }
         }
+    }
+
+    /// A file that is there, or with `folder_too` a folder; a relative path starts in `folder`.
+    pub fn existing(&mut self, key: &str, folder: &Path, folder_too: bool) -> Option<PathBuf> {
+        let named = self.text(key)?;
+        let path = folder.join(&named);
+        let is_there = path.is_file() || (folder_too && path.is_dir());
+        self.check(key, is_there, || {
+            let what = if folder_too { "neither a file nor a folder" } else { "no such file" };
+            format!("found {named:?}; there is {what} at {}", path.display())
+        });
+        is_there.then_some(path)
+    }
+
+    /// Whether nothing at all is said.
+    pub fn is_silent(&self) -> bool {
+        self.table.is_empty()
+    }
+
+    /// Whether a key is there.
+    pub fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
     }
 
     /// True or false.

@@ -37,6 +37,28 @@ pub struct Diagnosis {
     pub notes: Vec<String>,
 }
 
+impl Diagnosis {
+    /// Nothing is claimed of a case.
+    pub fn nothing(case: &str, false_alarm_probability: f64) -> Self {
+        Self {
+            schema: "oare.diagnosis/1".into(),
+            case: case.into(),
+            verdict: Verdict::Consistent,
+            false_alarm_probability,
+            located: Located { frame: "body".into(), ..Located::default() },
+            effects: Vec::new(),
+            alternatives: Vec::new(),
+            hypothesis: None,
+            fit: None,
+            upper_limits: Vec::new(),
+            separating_observation: None,
+            cannot_tell_apart: Vec::new(),
+            arcs: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+}
+
 /// What is claimed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -119,6 +141,13 @@ pub struct EffectAnswer {
     /// RMS of its contribution, body axes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_ng: Option<[f64; 3]>,
+}
+
+impl EffectAnswer {
+    /// The value of a parameter, where the effect has it.
+    pub fn parameter(&self, name: &str) -> Option<f64> {
+        self.parameters.iter().find(|p| p.name == name).map(|p| p.value)
+    }
 }
 
 /// A number with its standard error.
@@ -214,7 +243,7 @@ pub struct SeparatingObservation {
     pub kind: String,
     /// What to do.
     pub text: String,
-    /// Matched-filter SNR by which the sets would then differ, less what they differ by now; None where it was not simulated.
+    /// Log evidence that it is expected to add for the true set against its nearest rival; None where it could not be simulated.
     pub gain: Option<f64>,
 }
 

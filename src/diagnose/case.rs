@@ -1,5 +1,8 @@
 //! A case, read from its texts and checked. Not here: files (the command reads them), and what other kinds of recording hold.
 
+use std::ops::Deref;
+use std::sync::Arc;
+
 use jiff::Timestamp;
 
 use super::error::CaseError;
@@ -125,21 +128,36 @@ pub struct Event {
     pub detail: String,
 }
 
-/// A checked `acceleration_csv` case: every window lies inside simulation and ancillary data.
+/// What a recording is compared with, checked: a case that lacks its recording.
 #[derive(Debug, Clone)]
-pub struct Case {
+pub struct Expectation {
     /// `case.toml`.
     pub header: Header,
-    /// The recording.
-    pub recording: Recording,
     /// The simulation.
     pub simulation: Simulation,
     /// The ancillary data.
     pub ancillary: Ancillary,
     /// The mission log, in order of time.
     pub events: Vec<Event>,
+}
+
+/// A checked `acceleration_csv` case: every window lies inside simulation and ancillary data.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// What the recording is compared with.
+    pub expected: Arc<Expectation>,
+    /// The recording.
+    pub recording: Recording,
     /// Windows left out because the simulation's grid is too coarse for its own signal there.
     pub windows_too_rough: usize,
+}
+
+impl Deref for Case {
+    type Target = Expectation;
+
+    fn deref(&self) -> &Expectation {
+        &self.expected
+    }
 }
 
 impl Header {
@@ -199,22 +217,59 @@ impl Header {
     }
 }
 
+impl Expectation {
+    /// From its parts, units checked.
+    ///
+    /// # Errors
+    /// The first unit that cannot be right.
+    pub fn new(
+        header: Header,
+        simulation: Simulation,
+        ancillary: Ancillary,
+        mut events: Vec<Event>,
+    ) -> Result<Self, CaseError> {
+        check_simulation(&header.files.simulation, &simulation)?;
+        check_ancillary(&header.files.ancillary, &ancillary)?;
+        events.sort_by(|a, b| a.clock_s.total_cmp(&b.clock_s));
+        Ok(Self { header, simulation, ancillary, events })
+    }
+
+    /// From the texts of its files, of which a recording is not one.
+    ///
+    /// # Errors
+    /// What is wrong with each of the files.
+    pub fn from_texts(header: Header, texts: &Texts) -> Result<Self, Vec<CaseError>> {
+        let files = &header.files;
+        let simulation = given(&files.simulation, &texts.simulation)
+            .and_then(|text| parse_simulation(&files.simulation, text))
+            .and_then(|simulation| check_simulation(&files.simulation, &simulation).map(|()| simulation));
+        let ancillary = given(&files.ancillary, &texts.ancillary)
+            .and_then(|text| parse_ancillary(&files.ancillary, text))
+            .and_then(|ancillary| check_ancillary(&files.ancillary, &ancillary).map(|()| ancillary));
+        let events = parse_log(&files.events, &texts.events);
+        match (simulation, ancillary, events) {
+            (Ok(simulation), Ok(ancillary), Ok(events)) => {
+                Self::new(header, simulation, ancillary, events).map_err(|error| vec![error])
+            }
+            (simulation, ancillary, events) => {
+                Err([simulation.err(), ancillary.err(), events.err()].into_iter().flatten().collect())
+            }
+        }
+    }
+
+    /// Events of one kind as spans `[start_s, end_s]`.
+    pub fn spans(&self, kind: &str) -> Vec<[f64; 2]> {
+        self.events.iter().filter(|e| e.kind == kind).map(|e| [e.clock_s, e.clock_s + e.duration_s]).collect()
+    }
+}
+
 impl Case {
     /// From the texts of its files.
     pub fn from_texts(header: Header, texts: &Texts) -> Result<Self, CaseError> {
-        let file = |name: &str, text: &Option<String>| {
-            text.clone().ok_or_else(|| CaseError::MissingFile { file: name.to_string() })
-        };
-        let recording = parse_recording(&header.files.recording, &file(&header.files.recording, &texts.recording)?)?;
-        let simulation =
-            parse_simulation(&header.files.simulation, &file(&header.files.simulation, &texts.simulation)?)?;
-        let ancillary = parse_ancillary(&header.files.ancillary, &file(&header.files.ancillary, &texts.ancillary)?)?;
-        let events = match &texts.events {
-            Some(text) => parse_events(&header.files.events, text)?,
-            None if header.files.events.is_empty() => Vec::new(),
-            None => return Err(CaseError::MissingFile { file: header.files.events.clone() }),
-        };
-        Self::new(header, recording, simulation, ancillary, events)
+        let name = header.files.recording.clone();
+        let recording = parse_recording(&name, given(&name, &texts.recording)?)?;
+        let expected = Expectation::from_texts(header, texts).map_err(first)?;
+        Self::meet(Arc::new(expected), recording)
     }
 
     /// From its parts: units checked, and windows outside simulation, ancillary data or the span asked for left out.
@@ -223,15 +278,25 @@ impl Case {
         recording: Recording,
         simulation: Simulation,
         ancillary: Ancillary,
-        mut events: Vec<Event>,
+        events: Vec<Event>,
     ) -> Result<Self, CaseError> {
-        check_units(&header, &recording, &simulation, &ancillary)?;
+        Self::meet(Arc::new(Expectation::new(header, simulation, ancillary, events)?), recording)
+    }
+
+    /// A recording and what it is compared with: its unit checked, and windows outside simulation, ancillary data or the span
+    /// asked for left out.
+    ///
+    /// # Errors
+    /// When the unit cannot be right, or too little is in common.
+    pub fn meet(expected: Arc<Expectation>, recording: Recording) -> Result<Self, CaseError> {
+        let files = &expected.header.files;
+        check_recording(&files.recording, &recording)?;
         let common = |grid: &[f64]| [grid[0] + HALF_WINDOW_S, grid[grid.len() - 1] - HALF_WINDOW_S];
         let mut kept = recording;
         for (file, span) in [
-            ("case.toml".to_string(), header.span_s),
-            (header.files.simulation.clone(), common(&simulation.clock_s)),
-            (header.files.ancillary.clone(), common(&ancillary.clock_s)),
+            ("case.toml", expected.header.span_s),
+            (&files.simulation, common(&expected.simulation.clock_s)),
+            (&files.ancillary, common(&expected.ancillary.clock_s)),
         ] {
             let [first, last] = [kept.clock_s[0], kept.clock_s[kept.clock_s.len() - 1]];
             kept = within(&kept, span);
@@ -239,7 +304,7 @@ impl Case {
                 return Err(CaseError::NoOverlap {
                     recording_start_s: first,
                     recording_end_s: last,
-                    file,
+                    file: file.to_string(),
                     start_s: span[0],
                     end_s: span[1],
                     common: kept.clock_s.len(),
@@ -248,19 +313,30 @@ impl Case {
             }
         }
         let before = kept.clock_s.len();
-        let smooth = smooth_enough(&kept, &simulation);
+        let smooth = smooth_enough(&kept, &expected.simulation);
         if smooth.clock_s.len() >= WINDOWS_MIN {
             kept = smooth;
         }
         let windows_too_rough = before - kept.clock_s.len();
-        events.sort_by(|a, b| a.clock_s.total_cmp(&b.clock_s));
-        Ok(Self { header, recording: kept, simulation, ancillary, events, windows_too_rough })
+        Ok(Self { expected, recording: kept, windows_too_rough })
     }
+}
 
-    /// Events of one kind as spans `[start_s, end_s]`.
-    pub fn spans(&self, kind: &str) -> Vec<[f64; 2]> {
-        self.events.iter().filter(|e| e.kind == kind).map(|e| [e.clock_s, e.clock_s + e.duration_s]).collect()
+/// The text of a file the case names.
+fn given<'a>(file: &str, text: &'a Option<String>) -> Result<&'a str, CaseError> {
+    text.as_deref().ok_or_else(|| CaseError::MissingFile { file: file.to_string() })
+}
+
+fn parse_log(file: &str, text: &Option<String>) -> Result<Vec<Event>, CaseError> {
+    match text {
+        Some(text) => parse_events(file, text),
+        None if file.is_empty() => Ok(Vec::new()),
+        None => Err(CaseError::MissingFile { file: file.to_string() }),
     }
+}
+
+fn first(mut errors: Vec<CaseError>) -> CaseError {
+    errors.swap_remove(0)
 }
 
 fn within(recording: &Recording, span: [f64; 2]) -> Recording {
@@ -309,27 +385,33 @@ fn smooth_enough(recording: &Recording, simulation: &Simulation) -> Recording {
     take(recording, &keep)
 }
 
-fn check_units(
-    header: &Header,
-    recording: &Recording,
-    simulation: &Simulation,
-    ancillary: &Ancillary,
-) -> Result<(), CaseError> {
-    let f = &header.files;
-    for k in 0..3 {
-        let axis = ["ax_ng", "ay_ng", "az_ng"][k];
-        typical(&f.recording, axis, &recording.a_ng[k], "ng", 1e-2, 1e7)?;
-        typical(&f.recording, ["dev_x_ng", "dev_y_ng", "dev_z_ng"][k], &recording.dev_ng[k], "ng", 1e-3, 1e7)?;
-        typical(&f.simulation, axis, &simulation.a_ng[k], "ng", 1e-6, 1e7)?;
+/// Columns of accelerations.
+const ACCELERATION: [&str; 3] = ["ax_ng", "ay_ng", "az_ng"];
+
+fn check_recording(file: &str, recording: &Recording) -> Result<(), CaseError> {
+    if recording.clock_s.len() < WINDOWS_MIN {
+        return Err(CaseError::TooFew { file: file.into(), found: recording.clock_s.len(), needed: WINDOWS_MIN });
     }
+    for k in 0..3 {
+        typical(file, ACCELERATION[k], &recording.a_ng[k], "ng", 1e-2, 1e7)?;
+        typical(file, ["dev_x_ng", "dev_y_ng", "dev_z_ng"][k], &recording.dev_ng[k], "ng", 1e-3, 1e7)?;
+    }
+    Ok(())
+}
+
+fn check_simulation(file: &str, simulation: &Simulation) -> Result<(), CaseError> {
+    (0..3).try_for_each(|k| typical(file, ACCELERATION[k], &simulation.a_ng[k], "ng", 1e-6, 1e7))
+}
+
+fn check_ancillary(file: &str, ancillary: &Ancillary) -> Result<(), CaseError> {
     let norm = |v: &[[f64; 3]]| v.iter().map(|x| x.iter().map(|c| c * c).sum::<f64>().sqrt()).collect::<Vec<f64>>();
-    typical(&f.ancillary, "rx_m, ry_m, rz_m", &norm(&ancillary.r_m), "m", 6.4e6, 5e7)?;
-    typical(&f.ancillary, "vx_m_s, vy_m_s, vz_m_s", &norm(&ancillary.v_m_s), "m/s", 5e2, 1.2e4)?;
-    typical(&f.ancillary, "wx_rad_s, wy_rad_s, wz_rad_s", &norm(&ancillary.w_rad_s), "rad/s", 0.0, 1.0)?;
-    typical(&f.ancillary, "density_kg_m3", &ancillary.density_kg_m3, "kg/m3", 0.0, 1e-6)?;
-    typical(&f.ancillary, "temperature_c", &ancillary.temperature_c, "C", 0.0, 500.0)?;
+    typical(file, "rx_m, ry_m, rz_m", &norm(&ancillary.r_m), "m", 6.4e6, 5e7)?;
+    typical(file, "vx_m_s, vy_m_s, vz_m_s", &norm(&ancillary.v_m_s), "m/s", 5e2, 1.2e4)?;
+    typical(file, "wx_rad_s, wy_rad_s, wz_rad_s", &norm(&ancillary.w_rad_s), "rad/s", 0.0, 1.0)?;
+    typical(file, "density_kg_m3", &ancillary.density_kg_m3, "kg/m3", 0.0, 1e-6)?;
+    typical(file, "temperature_c", &ancillary.temperature_c, "C", 0.0, 500.0)?;
     let q: Vec<f64> = ancillary.q.iter().map(|q| q.iter().map(|c| c * c).sum::<f64>().sqrt()).collect();
-    typical(&f.ancillary, "qw, qx, qy, qz (norm)", &q, "1, the norm", 0.99, 1.01)
+    typical(file, "qw, qx, qy, qz (norm)", &q, "1, the norm", 0.99, 1.01)
 }
 
 fn typical(file: &str, column: &str, values: &[f64], unit: &'static str, low: f64, high: f64) -> Result<(), CaseError> {

@@ -121,3 +121,20 @@ pub enum CaseError {
     #[error("{0}")]
     Numeric(String),
 }
+
+impl CaseError {
+    /// The file it is about, where it is one.
+    pub fn file(&self) -> Option<&String> {
+        match self {
+            Self::MissingFile { file }
+            | Self::MissingColumn { file, .. }
+            | Self::NotANumber { file, .. }
+            | Self::Csv { file, .. }
+            | Self::TimeOrder { file, .. }
+            | Self::Unit { file, .. }
+            | Self::TooFew { file, .. }
+            | Self::NoOverlap { file, .. } => Some(file),
+            Self::Toml(_) | Self::Key { .. } | Self::Kind(_) | Self::Numeric(_) => None,
+        }
+    }
+}

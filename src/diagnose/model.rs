@@ -66,12 +66,15 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
             }
             let sigma = if p.step > 0.0 {
                 theta_next += 1;
-                joint.get((theta_next - 1, theta_next - 1)).map_or(m.theta_sigma[j], |v| v.max(0.0).sqrt()) * inflation
+                // Not finite where a step changes nothing, as for an onset in a hole of the record.
+                let curvature = joint.get((theta_next - 1, theta_next - 1)).map(|v| v.max(0.0).sqrt());
+                curvature.filter(|s| s.is_finite()).unwrap_or(m.theta_sigma[j]) * inflation
             } else {
                 1.0
             };
             let sigma = if p.name == "onset_s" && p.step > 0.0 {
-                sigma.max(onset_sigma(scene, frame, entries, set, out.len()) * inflation)
+                let scanned = onset_sigma(scene, frame, entries, set, out.len()) * inflation;
+                sigma.min(3.0 * scanned).max(scanned)
             } else {
                 sigma
             };
@@ -101,8 +104,13 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
     out
 }
 
-/// Windows on either side of an onset over which its posterior is scanned, and the spacing of the scan, s.
-const ONSET_SCAN_S: [f64; 2] = [600.0, 20.0];
+/// Half width of the scan of an onset's posterior, s, and its steps to either side. While the posterior is not low at an end of
+/// the scan it is made again twice as wide: an onset inside a hole of the record lies anywhere in it.
+const ONSET_SCAN_S: f64 = 600.0;
+const ONSET_SCAN_STEPS: i32 = 30;
+const ONSET_SCANS: i32 = 7;
+/// Log posterior below its top that counts as low.
+const ONSET_LOW: f64 = 5.0;
 
 /// Standard error of the onset of member `i` about its fitted value, from its posterior: one window more or less can decide,
 /// so that the curvature at the peak says too little.
@@ -113,21 +121,32 @@ fn onset_sigma(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: us
         score: 0.0,
     };
     let chosen = others.chosen(frame);
-    let steps = (ONSET_SCAN_S[0] / ONSET_SCAN_S[1]) as i32;
     let sizes = set.members[i].sizes(entries);
-    let scan: Vec<(f64, f64)> = (-steps..=steps)
-        .filter_map(|s| {
-            let shift = f64::from(s) * ONSET_SCAN_S[1];
-            let mut theta = set.members[i].theta;
-            theta[0] += shift;
-            let raws = (effect.signature)(scene, &theta)?.columns();
-            let columns: Vec<Column> = raws.iter().zip(&sizes).map(|(raw, size)| frame.column(raw, *size)).collect();
-            Some((shift, chosen.gain(&columns)))
-        })
-        .collect();
-    let top = scan.iter().map(|s| s.1).fold(f64::NEG_INFINITY, f64::max);
-    let weight: f64 = scan.iter().map(|s| (s.1 - top).exp()).sum();
-    (scan.iter().map(|s| s.0 * s.0 * (s.1 - top).exp()).sum::<f64>() / weight).sqrt()
+    let gain_at = |shift: f64| {
+        let mut theta = set.members[i].theta;
+        theta[0] += shift;
+        let raws = (effect.signature)(scene, &theta)?.columns();
+        let columns: Vec<Column> = raws.iter().zip(&sizes).map(|(raw, size)| frame.column(raw, *size)).collect();
+        Some(chosen.gain(&columns))
+    };
+    let mut sigma = 0.0;
+    for scan in 0..ONSET_SCANS {
+        let step = ONSET_SCAN_S * f64::from(1 << scan) / f64::from(ONSET_SCAN_STEPS);
+        let posterior: Vec<(f64, f64)> = (-ONSET_SCAN_STEPS..=ONSET_SCAN_STEPS)
+            .map(|s| f64::from(s) * step)
+            .filter_map(|shift| Some((shift, gain_at(shift)?)))
+            .collect();
+        let top = posterior.iter().map(|s| s.1).fold(f64::NEG_INFINITY, f64::max);
+        let weight: f64 = posterior.iter().map(|s| (s.1 - top).exp()).sum();
+        if weight > 0.0 {
+            sigma = (posterior.iter().map(|s| s.0 * s.0 * (s.1 - top).exp()).sum::<f64>() / weight).sqrt();
+        }
+        let low = |end: Option<&(f64, f64)>| end.is_none_or(|s| s.1 < top - ONSET_LOW);
+        if low(posterior.first()) && low(posterior.last()) {
+            break;
+        }
+    }
+    sigma
 }
 
 /// Covariance of all coefficients, then of all free nonlinear parameters, from the linearised joint fit.

@@ -3,10 +3,13 @@
 //! All here comes from epoch, position, attitude and the log, by the project's own physics; no regressor is read from
 //! the simulation but its signal itself. Not here: which of it explains anything.
 
+use std::ops::Deref;
+use std::sync::Arc;
+
 use crate::physics::{self, Mat3, Vec3};
 use crate::units::NANO_G_M_S2;
 
-use super::case::{Case, HALF_WINDOW_S};
+use super::case::{Case, Expectation, HALF_WINDOW_S, Header};
 use super::error::CaseError;
 use super::measure::{Measurement, coverage};
 use super::noise::{Schedule, activity};
@@ -14,23 +17,11 @@ use super::noise::{Schedule, activity};
 /// One series per body axis.
 pub type Axes = [Vec<f64>; 3];
 
-/// The case, measured and furnished with its physics.
+/// The physics of the orbit on the ancillary grid: all of a scene that no window of the recording changes.
 #[derive(Clone)]
-pub struct Scene<'a> {
-    /// The case.
-    pub case: &'a Case,
-    /// Window centres and steps.
-    pub schedule: Schedule,
-    /// Activity of each window, per axis.
-    pub activity: Axes,
-    /// Recording less measured simulation, ng.
-    pub residual_ng: Axes,
-    /// The measured simulation, ng.
-    pub simulated_ng: Axes,
+pub struct Surroundings {
     /// The simulation on the ancillary grid, ng.
     pub simulated_grid_ng: Axes,
-    /// From the ancillary grid to the windows.
-    pub measurement: Measurement,
     /// The vehicle, for the force models.
     pub vehicle: physics::vehicle::Vehicle,
     /// Ancillary grid.
@@ -53,29 +44,54 @@ pub struct Scene<'a> {
     pub field_body_t: Vec<Vec3>,
     /// Drag as modelled with a co-rotating atmosphere, body axes, ng.
     pub drag_ng: Vec<Vec3>,
+    /// Density the simulation used.
+    pub density_kg_m3: Vec<f64>,
     /// Sensor temperature.
     pub temperature_c: Vec<f64>,
     /// Orbital period, s.
     pub period_s: f64,
 }
 
-impl<'a> Scene<'a> {
-    /// Furnish a checked case.
-    pub fn new(case: &'a Case) -> Result<Self, CaseError> {
-        let anc = &case.ancillary;
-        let windows = &case.recording.clock_s;
-        let to_windows = Measurement::new(&case.simulation.clock_s, windows, 0.0);
-        let simulated_ng = to_windows.apply3(&case.simulation.a_ng);
-        let residual_ng =
-            std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
-        let asleep: Vec<bool> = coverage(windows, &case.spans("crew_sleep")).iter().map(|c| *c > 0.5).collect();
+/// The case, measured and furnished with its physics.
+#[derive(Clone)]
+pub struct Scene<'a> {
+    /// The case.
+    pub case: &'a Case,
+    /// Window centres and steps.
+    pub schedule: Schedule,
+    /// Activity of each window, per axis.
+    pub activity: Axes,
+    /// Recording less measured simulation, ng.
+    pub residual_ng: Axes,
+    /// The measured simulation, ng.
+    pub simulated_ng: Axes,
+    /// From the ancillary grid to the windows.
+    pub measurement: Measurement,
+    surroundings: Arc<Surroundings>,
+}
+
+impl Deref for Scene<'_> {
+    type Target = Surroundings;
+
+    fn deref(&self) -> &Surroundings {
+        &self.surroundings
+    }
+}
+
+impl Surroundings {
+    /// The physics along the ancillary data of an expectation.
+    ///
+    /// # Errors
+    /// [`CaseError`] where an attitude or an instant defeats the physics.
+    pub fn new(expected: &Expectation) -> Result<Self, CaseError> {
+        let anc = &expected.ancillary;
         let vector = |v: &[f64; 3]| Vec3::new(v[0], v[1], v[2]);
         let r_m: Vec<Vec3> = anc.r_m.iter().map(vector).collect();
         let v_m_s: Vec<Vec3> = anc.v_m_s.iter().map(vector).collect();
         let w_rad_s: Vec<Vec3> = anc.w_rad_s.iter().map(vector).collect();
         let body = bodies(&anc.q)?;
-        let vehicle = vehicle(case);
-        let unix: Vec<f64> = anc.clock_s.iter().map(|t| case.header.unix_s(*t)).collect();
+        let vehicle = vehicle(&expected.header);
+        let unix: Vec<f64> = anc.clock_s.iter().map(|t| expected.header.unix_s(*t)).collect();
         let sun: Vec<Vec3> = unix.iter().map(|t| physics::sun::direction(*t)).collect();
         let sunlit = r_m.iter().zip(&sun).map(|(r, s)| physics::shadow::sunlit_fraction(r, s)).collect();
         let field_body_t = fields(&unix, &r_m, &body)?;
@@ -83,15 +99,11 @@ impl<'a> Scene<'a> {
             .map(|i| drag_ng(&vehicle, anc.density_kg_m3[i], &r_m[i], &v_m_s[i], &body[i], 1.0, &Vec3::zeros()))
             .collect();
         let period_s = period_s(&r_m[0], &v_m_s[0]);
+        let simulation = &expected.simulation;
         Ok(Self {
-            schedule: Schedule::new(windows),
-            activity: std::array::from_fn(|k| activity(&case.recording.dev_ng[k], &asleep)),
-            residual_ng,
             simulated_grid_ng: std::array::from_fn(|k| {
-                interpolate(&case.simulation.clock_s, &case.simulation.a_ng[k], &anc.clock_s)
+                interpolate(&simulation.clock_s, &simulation.a_ng[k], &anc.clock_s)
             }),
-            simulated_ng,
-            measurement: Measurement::new(&anc.clock_s, windows, 0.0),
             vehicle,
             grid_s: anc.clock_s.clone(),
             wdot_rad_s2: gradient(&anc.clock_s, &w_rad_s),
@@ -103,10 +115,88 @@ impl<'a> Scene<'a> {
             sunlit,
             field_body_t,
             drag_ng,
+            density_kg_m3: anc.density_kg_m3.clone(),
             temperature_c: anc.temperature_c.clone(),
             period_s,
-            case,
         })
+    }
+}
+
+impl Surroundings {
+    /// The first grid points.
+    pub fn until(&self, points: usize) -> Self {
+        let mut cut = self.clone();
+        cut.simulated_grid_ng.iter_mut().for_each(|series| series.truncate(points));
+        cut.body.truncate(points);
+        for series in [
+            &mut cut.r_m,
+            &mut cut.v_m_s,
+            &mut cut.w_rad_s,
+            &mut cut.wdot_rad_s2,
+            &mut cut.sun,
+            &mut cut.field_body_t,
+            &mut cut.drag_ng,
+        ] {
+            series.truncate(points);
+        }
+        for series in [&mut cut.grid_s, &mut cut.sunlit, &mut cut.density_kg_m3, &mut cut.temperature_c] {
+            series.truncate(points);
+        }
+        cut
+    }
+
+    /// These, and what comes later.
+    pub fn then(mut self, later: &Self) -> Self {
+        for (series, more) in self.simulated_grid_ng.iter_mut().zip(&later.simulated_grid_ng) {
+            series.extend(more);
+        }
+        self.body.extend(&later.body);
+        self.r_m.extend(&later.r_m);
+        self.v_m_s.extend(&later.v_m_s);
+        self.w_rad_s.extend(&later.w_rad_s);
+        self.wdot_rad_s2.extend(&later.wdot_rad_s2);
+        self.sun.extend(&later.sun);
+        self.field_body_t.extend(&later.field_body_t);
+        self.drag_ng.extend(&later.drag_ng);
+        self.grid_s.extend(&later.grid_s);
+        self.sunlit.extend(&later.sunlit);
+        self.density_kg_m3.extend(&later.density_kg_m3);
+        self.temperature_c.extend(&later.temperature_c);
+        self
+    }
+}
+
+impl<'a> Scene<'a> {
+    /// What no window changes.
+    pub fn surroundings(&self) -> &Surroundings {
+        &self.surroundings
+    }
+
+    /// Furnish a checked case.
+    ///
+    /// # Errors
+    /// As [`Surroundings::new`].
+    pub fn new(case: &'a Case) -> Result<Self, CaseError> {
+        Ok(Self::within(case, Arc::new(Surroundings::new(&case.expected)?)))
+    }
+
+    /// The scene of a case in surroundings that are known already: those of its expectation.
+    pub fn within(case: &'a Case, surroundings: Arc<Surroundings>) -> Self {
+        let windows = &case.recording.clock_s;
+        let to_windows = Measurement::new(&case.simulation.clock_s, windows, 0.0);
+        let simulated_ng = to_windows.apply3(&case.simulation.a_ng);
+        let residual_ng =
+            std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
+        let asleep: Vec<bool> = coverage(windows, &case.spans("crew_sleep")).iter().map(|c| *c > 0.5).collect();
+        Self {
+            schedule: Schedule::new(windows),
+            activity: std::array::from_fn(|k| activity(&case.recording.dev_ng[k], &asleep)),
+            residual_ng,
+            simulated_ng,
+            measurement: Measurement::new(&surroundings.grid_s, windows, 0.0),
+            surroundings,
+            case,
+        }
     }
 
     /// The same scene with another residual: a bootstrap replicate.
@@ -132,15 +222,7 @@ impl<'a> Scene<'a> {
 
     /// Drag at grid point `i` with another co-rotation or wind, ng, body axes.
     pub fn drag_with(&self, i: usize, corotation: f64, wind_m_s: &Vec3) -> Vec3 {
-        drag_ng(
-            &self.vehicle,
-            self.case.ancillary.density_kg_m3[i],
-            &self.r_m[i],
-            &self.v_m_s[i],
-            &self.body[i],
-            corotation,
-            wind_m_s,
-        )
+        drag_ng(&self.vehicle, self.density_kg_m3[i], &self.r_m[i], &self.v_m_s[i], &self.body[i], corotation, wind_m_s)
     }
 
     /// Tensor T of a = T r: what a sensor offset of one metre feels, 1/s^2, at grid point `i`, body axes.
@@ -165,8 +247,8 @@ impl<'a> Scene<'a> {
     }
 }
 
-fn vehicle(case: &Case) -> physics::vehicle::Vehicle {
-    let v = &case.header.vehicle;
+fn vehicle(header: &Header) -> physics::vehicle::Vehicle {
+    let v = &header.vehicle;
     physics::vehicle::Vehicle {
         mass_kg: v.mass_kg,
         drag_coefficient: v.drag_coefficient,

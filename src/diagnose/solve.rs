@@ -79,21 +79,35 @@ impl Solution {
 
 /// Search and weigh. `start` is a first guess of the noise, when one is at hand.
 pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -> Solution {
+    match solve_unless(scene, library, start, &|| false) {
+        Some(solution) => solution,
+        None => unreachable!("nobody asked to stop"),
+    }
+}
+
+/// As [`solve`], and `None` as soon as `stop` says so: it is asked every second or so of work.
+pub fn solve_unless(
+    scene: &Scene,
+    library: &Library,
+    start: Option<&[AxisNoise; 3]>,
+    stop: &dyn Fn() -> bool,
+) -> Option<Solution> {
     let entries = &library.entries;
     let noise_null = search::fit_noise(scene, &scene.residual_ng, start, if start.is_some() { 50 } else { 110 });
     let null = search::weigh_with_own_noise(scene, entries, &Set::default(), &noise_null, 0, 0);
-    let (pool, singles) = converged(scene, library, &noise_null);
-    let (mut listed, mut open) = pool.weigh(scene, entries, OWN_NOISE);
+    let (pool, singles) = converged(scene, library, &noise_null, stop)?;
+    let (mut listed, mut open) = pool.weigh(scene, entries, OWN_NOISE, stop)?;
     // What the null takes for slow noise may be a slow effect: looked for a second time as if there were no slow noise. Each
     // candidate is weighed with the noise of its own residual as all are.
     if let Some(quiet) = quiet(&noise_null) {
         let frame = Frame::new(&quiet, &scene.schedule, &scene.activity, &scene.residual_ng);
-        let pool = Pool::found(scene, library, &frame, &Bank::new(&frame, entries), quiet);
-        let (more_listed, more_open) = pool.weigh(scene, entries, OWN_NOISE_QUIET);
+        let pool = Pool::found(scene, library, &frame, &Bank::new(&frame, entries), quiet, stop)?;
+        let (more_listed, more_open) = pool.weigh(scene, entries, OWN_NOISE_QUIET, stop)?;
         merge(&mut listed, more_listed);
         merge(&mut open, more_open);
     }
-    Solution { listed, open, null, singles }
+    lessen(scene, entries, &mut listed, stop)?;
+    Some(Solution { listed, open, null, singles })
 }
 
 /// The noise with hardly any slow part, `None` where it has hardly any.
@@ -113,12 +127,25 @@ struct Pool {
 }
 
 impl Pool {
-    fn found(scene: &Scene, library: &Library, frame: &Frame, bank: &Bank, noise: [AxisNoise; 3]) -> Self {
+    fn found(
+        scene: &Scene,
+        library: &Library,
+        frame: &Frame,
+        bank: &Bank,
+        noise: [AxisNoise; 3],
+        stop: &dyn Fn() -> bool,
+    ) -> Option<Self> {
+        if stop() {
+            return None;
+        }
         let entries = &library.entries;
         let listed_ids: Vec<usize> = (0..library.listed).collect();
         let open_ids: Vec<usize> = (library.listed..entries.len()).collect();
         let mut listed = search::grow(frame, bank, &listed_ids, vec![Set::default()], SET_MAX);
         listed.retain(|s| !s.members.is_empty());
+        if stop() {
+            return None;
+        }
         polish(scene, frame, entries, &mut listed, 8);
         let mut seeds = vec![Set::default()];
         seeds.extend(listed.iter().take(2).cloned());
@@ -136,7 +163,7 @@ impl Pool {
         joined.retain(|s| library.is_open(s));
         opens.extend(joined.into_iter().take(4));
         distinct(&mut opens);
-        Self { noise, listed, opens }
+        Some(Self { noise, listed, opens })
     }
 
     fn top(&self) -> Option<&Set> {
@@ -144,23 +171,35 @@ impl Pool {
     }
 
     /// The best of each kind, each weighed with its own noise, best first.
-    fn weigh(self, scene: &Scene, entries: &[Entry], count: [usize; 2]) -> (Vec<Weighed>, Vec<Weighed>) {
-        let weigh = |sets: Vec<Set>, count: usize| {
+    fn weigh(
+        self,
+        scene: &Scene,
+        entries: &[Entry],
+        count: [usize; 2],
+        stop: &dyn Fn() -> bool,
+    ) -> Option<(Vec<Weighed>, Vec<Weighed>)> {
+        let weigh = |sets: Vec<Set>, count: usize| -> Option<Vec<Weighed>> {
             let top = sets.first().map_or(0.0, |s| s.score);
             let worth = top > WORTH_A_REFIT;
             let keep = sets.into_iter().filter(|s| s.score > top - 14.0).take(if worth { count } else { 1 });
-            let mut weighed: Vec<Weighed> = keep
-                .map(|s| search::weigh_with_own_noise(scene, entries, &s, &self.noise, if worth { 2 } else { 1 }, 40))
-                .collect();
+            let rounds = if worth { 2 } else { 1 };
+            let mut weighed = keep
+                .map(|s| (!stop()).then(|| search::weigh_with_own_noise(scene, entries, &s, &self.noise, rounds, 40)))
+                .collect::<Option<Vec<Weighed>>>()?;
             weighed.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
-            weighed
+            Some(weighed)
         };
-        (weigh(self.listed, count[0]), weigh(self.opens, count[1]))
+        Some((weigh(self.listed, count[0])?, weigh(self.opens, count[1])?))
     }
 }
 
 /// Sets found at the noise of the best of them, from the null's noise on; and the score of every entry alone at the latter.
-fn converged(scene: &Scene, library: &Library, noise_null: &[AxisNoise; 3]) -> (Pool, Vec<(usize, f64)>) {
+fn converged(
+    scene: &Scene,
+    library: &Library,
+    noise_null: &[AxisNoise; 3],
+    stop: &dyn Fn() -> bool,
+) -> Option<(Pool, Vec<(usize, f64)>)> {
     let entries = &library.entries;
     let mut noise = *noise_null;
     let mut best_key = Vec::new();
@@ -173,13 +212,37 @@ fn converged(scene: &Scene, library: &Library, noise_null: &[AxisNoise; 3]) -> (
             let chosen = nothing.chosen(&frame);
             singles = (0..entries.len()).map(|i| (i, search::best_of_entry(&bank, i, &chosen).0)).collect();
         }
-        let pool = Pool::found(scene, library, &frame, &bank, noise);
+        let pool = Pool::found(scene, library, &frame, &bank, noise, stop)?;
         let again = pool.top().filter(|top| top.score >= WORTH_A_REFIT && round < 2 && top.key() != best_key);
-        let Some(top) = again else { return (pool, singles) };
+        let Some(top) = again else { return Some((pool, singles)) };
         best_key = top.key();
         noise = search::weigh_with_own_noise(scene, entries, top, &noise, 2, 50).noise;
     }
     unreachable!("the rounds end by their number")
+}
+
+/// Weighs the best set with one member less, and that again, as long as a member is not needed: what only described slow noise
+/// is found at one noise together with what is real, and every set kept may hold it.
+fn lessen(scene: &Scene, entries: &[Entry], listed: &mut Vec<Weighed>, stop: &dyn Fn() -> bool) -> Option<()> {
+    loop {
+        let Some(best) = listed.first().filter(|best| best.set.members.len() > 1) else { return Some(()) };
+        let key = best.set.key();
+        let mut less = Vec::new();
+        for left_out in 0..best.set.members.len() {
+            if stop() {
+                return None;
+            }
+            let mut set = best.set.clone();
+            set.members.remove(left_out);
+            if !listed.iter().any(|w| w.set.key() == set.key()) {
+                less.push(search::weigh_with_own_noise(scene, entries, &set, &best.noise, 2, 40));
+            }
+        }
+        merge(listed, less);
+        if listed.first().is_none_or(|best| best.set.key() == key) {
+            return Some(());
+        }
+    }
 }
 
 /// Of sets found twice the better weighed one, best first.

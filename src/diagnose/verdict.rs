@@ -1,16 +1,16 @@
 //! From weighed hypotheses to what is said: consistent, explained, ambiguous or unexplained, with its figures.
 
 use super::answer::{
-    Alternative, Diagnosis, EffectAnswer, Fit, FitLevel, Hypothesis, Located, ParameterAnswer, SeparatingObservation,
-    UpperLimit, Verdict,
+    Alternative, Diagnosis, EffectAnswer, Fit, FitLevel, Hypothesis, Located, ParameterAnswer, UpperLimit, Verdict,
 };
-use super::catalogue::{Effect, WHOLE};
+use super::catalogue::{self, Effect, WHOLE};
 use super::design::{Chosen, Column, Frame};
 use super::locate;
 use super::model::{self, MemberFit, rms};
 use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{self, Entry, Family, Set, Weighed};
+use super::separating;
 use super::solve::{Library, Solution};
 
 /// Log odds by which an open form must beat the best listed set.
@@ -103,7 +103,7 @@ pub fn conclude(
     let (verdict, chosen, remains) = with_remains(scene, library, solution, (verdict, chosen), claim);
     let least = remains.as_ref().map_or(1.0, |r| r.probability);
     let overall = (probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
-    let mut answer = empty(scene, verdict, overall);
+    let mut answer = Diagnosis { verdict, ..Diagnosis::nothing(&scene.case.header.id, overall) };
     answer.located.covariates =
         locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
     let null_frame = Frame::new(&solution.null.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
@@ -179,25 +179,6 @@ fn of_remains(r: &Remains, beside: &str) -> Hypothesis {
         axis: r.axis.clone(),
         unit: "ng".into(),
         location: format!("{}.{beside}", r.location),
-    }
-}
-
-fn empty(scene: &Scene, verdict: Verdict, probability: f64) -> Diagnosis {
-    Diagnosis {
-        schema: "oare.diagnosis/1".into(),
-        case: scene.case.header.id.clone(),
-        verdict,
-        false_alarm_probability: probability,
-        located: Located { frame: "body".into(), ..Located::default() },
-        effects: Vec::new(),
-        alternatives: Vec::new(),
-        hypothesis: None,
-        fit: None,
-        upper_limits: Vec::new(),
-        separating_observation: None,
-        cannot_tell_apart: Vec::new(),
-        arcs: Vec::new(),
-        notes: Vec::new(),
     }
 }
 
@@ -281,8 +262,10 @@ fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Best, l
         answer.verdict = Verdict::Ambiguous;
         answer.cannot_tell_apart.push(ids(library, &best.set));
         answer.cannot_tell_apart.extend(rivals.iter().map(|w| ids(library, &w.set)));
+        let sets: Vec<&Set> = std::iter::once(&best.set).chain(rivals.iter().map(|w| &w.set)).collect();
+        let contestants = contestants(library, &sets, twin.is_some());
         answer.cannot_tell_apart.extend(twin);
-        answer.separating_observation = Some(separating(&answer.cannot_tell_apart));
+        answer.separating_observation = separating::cheapest(scene, &best.weighed.noise, &contestants);
     }
     answer.alternatives = others
         .iter()
@@ -327,24 +310,24 @@ fn step_at_mass_change(scene: &Scene, library: &Library, best: &Best) -> Option<
     })
 }
 
-/// What would decide between sets: their kinds say which observation they answer to differently.
-fn separating(sets: &[Vec<String>]) -> SeparatingObservation {
-    let sensor = ["bias_step", "bias_drift", "temperature_bias"];
-    let held = |id: &str| sets.iter().any(|s| s.iter().any(|x| x == id));
-    let some_sensor = sensor.iter().any(|id| held(id));
-    let all_sensor = sets.iter().all(|s| s.iter().any(|x| sensor.contains(&x.as_str())));
-    if some_sensor && !all_sensor {
-        return SeparatingObservation {
-            kind: "table_flip".into(),
-            text: "Measure with the table turned by 180 degrees: what belongs to the sensor changes sign in body axes, a real acceleration does not.".into(),
-            gain: None,
+/// The sets that cannot be told apart, best first, for the observation that would separate them; the last one may be the best
+/// with its mass shift taken for a bias step.
+fn contestants(library: &Library, sets: &[&Set], has_twin: bool) -> Vec<separating::Rival> {
+    let part = |m: &search::Member| match library.entries[m.entry].family {
+        Family::Listed(effect) => Some(separating::Part { effect, theta: m.theta }),
+        Family::Open(_) => None,
+    };
+    let mut rivals: Vec<separating::Rival> =
+        sets.iter().map(|set| set.members.iter().filter_map(part).collect()).collect();
+    if let (true, Some(step)) = (has_twin, catalogue::by_id("bias_step")) {
+        let stepping = |p: &separating::Part| match p.effect.id {
+            "mass_shift" => separating::Part { effect: step, ..p.clone() },
+            _ => p.clone(),
         };
+        let twin = rivals[0].iter().map(stepping).collect();
+        rivals.push(twin);
     }
-    SeparatingObservation {
-        kind: "attitude".into(),
-        text: "Hold another attitude for six hours, the ram direction along a different body axis: the sets predict different axes then.".into(),
-        gain: None,
-    }
+    rivals
 }
 
 fn effects(library: &Library, best: &Best, posterior: impl Fn(usize) -> f64) -> Vec<EffectAnswer> {

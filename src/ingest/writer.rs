@@ -155,6 +155,7 @@ impl Writer {
                     self.write_until_durable(&batch, runtime, give_up, NUMBERS_AHEAD)?;
                     self.take(&batch);
                     self.bring_up();
+                    self.publish_waiting();
                     self.conclude(&batch, parts.is_empty())?;
                     last_arrival = Instant::now();
                 }
@@ -165,11 +166,13 @@ impl Writer {
                     } else if self.station.read().expect("no holder panics").calibration_waits() {
                         self.bring_up();
                     }
+                    self.publish_waiting();
                     self.journal_until_durable(runtime, give_up)?;
                 }
             }
         }
         self.flush();
+        self.publish_waiting();
         self.write_until_durable(&[], runtime, give_up, 0)
     }
 
@@ -357,6 +360,14 @@ impl Writer {
                 changes.by_ref().take(AT_ONCE).filter_map(|change| body(&self.hub, &station, change)).collect()
             };
             self.unjournaled.extend(self.hub.publish(bodies));
+        }
+    }
+
+    /// What others left at the hub.
+    fn publish_waiting(&mut self) {
+        let waiting = self.hub.take_waiting();
+        if !waiting.is_empty() {
+            self.unjournaled.extend(self.hub.publish(waiting));
         }
     }
 

@@ -11,6 +11,7 @@
 
 pub mod autorange;
 pub mod calibration;
+pub mod expected;
 pub mod faults;
 pub mod flight;
 pub mod forces;

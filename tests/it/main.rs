@@ -3,6 +3,7 @@
 mod api;
 mod bad_input;
 mod dashboard;
+mod diagnosis;
 mod layering;
 mod live;
 mod replay;

@@ -196,6 +196,34 @@ function showNotices(events, anomalies) {
   }));
 }
 
+// ---- diagnosis ---------------------------------------------------------------------------------------------------------
+const significant = (x) => Math.abs(x) >= 1e5 ? Math.round(x).toLocaleString("en") : Number(x.toPrecision(4)).toLocaleString("en", { maximumFractionDigits: 6 });
+const spanText = (s) => s === null ? null : s < 7200 ? `${Math.round(s / 60)} min` : `${(s / 3600).toFixed(1)} h`;
+
+async function refreshDiagnosis() {
+  const answer = await get("/diagnosis").catch(() => null);
+  byId("diagnosis").hidden = !answer;
+  if (!answer) return;
+  const p = answer.progress, kinds = { consistent: "good", explained: "bad", ambiguous: "wait", unexplained: "bad" };
+  const said = !p || p.windows_searched > 0;
+  chip("verdict", said ? answer.verdict : p.state, said ? kinds[answer.verdict] : "");
+  byId("verdict").dataset.verdict = answer.verdict;
+  byId("diagnosis-sentence").textContent = p ? p.sentence : "";
+  const list = answer.effects.flatMap((e) => e.parameters.map((q, n) =>
+    [[n ? "" : e.name, q.name.replaceAll("_", " "), `${significant(q.value)} ± ${significant(q.sigma)} ${q.unit === "1" ? "" : q.unit}`]]));
+  if (answer.hypothesis) list.push([["hypothesis", answer.hypothesis.axis, answer.hypothesis.formula]]);
+  rows(byId("diagnosis-effects"), list);
+  if (!p) return;
+  const parts = [`${p.windows_searched.toLocaleString("en")} of ${p.windows_seen.toLocaleString("en")} usable windows looked at`];
+  if (p.last_clock_s !== null) parts.push(`as of MET ${clockText(p.last_clock_s - liftoffClockS)}`);
+  const since = p.counted_from === "onset" ? "after its onset" : "after the first data";
+  if (p.time_to_detect_s !== null) parts.push(`alarm ${spanText(p.time_to_detect_s)} ${since}`);
+  if (p.time_to_name_s !== null) parts.push(`named ${spanText(p.time_to_name_s)} ${since}`);
+  if (p.alarms_withdrawn) parts.push(`${p.alarms_withdrawn} alarm(s) withdrawn`);
+  if (p.state === "searching") parts.push("a search is under way");
+  byId("diagnosis-progress").textContent = parts.join(" · ");
+}
+
 // ---- live -------------------------------------------------------------------------------------------------------------
 let lastSeq = null;
 
@@ -203,12 +231,13 @@ function live() {
   // All of history the first time; after a broken connection, what came since.
   const from = lastSeq === null ? "-4294967296" : "seq:" + lastSeq;
   const scheme = location.protocol === "https:" ? "wss" : "ws";
-  const socket = new WebSocket(withToken(`${scheme}://${location.host}/accel/live?from=${from}&topics=window,calibration`));
+  const socket = new WebSocket(withToken(`${scheme}://${location.host}/accel/live?from=${from}&topics=window,calibration,diagnosis`));
   socket.onopen = () => chip("link", "live", "good");
   socket.onmessage = (frame) => {
     const message = JSON.parse(frame.data);
     lastSeq = message.seq;
     if (message.type === "window" || message.type === "supersede") take(message);
+    if (message.type === "diagnosis") refreshDiagnosis();
     if (message.type === "lag") chip("link", `live, ${message.count} missed`, "wait");
   };
   let opened = false;
@@ -220,5 +249,7 @@ function live() {
 addEventListener("resize", () => { plots.forEach((plot, n) => plot.setSize({ width: byId("plot-" + AXES[n][0]).clientWidth, height: 190 })); dirty = true; });
 setInterval(draw, 250);
 setInterval(refresh, REFRESH_MS);
+setInterval(refreshDiagnosis, REFRESH_MS);
 refresh();
+refreshDiagnosis();
 live();

@@ -1,6 +1,6 @@
 //! The sentence a flight engineer needs, from the answer.
 
-use crate::diagnose::answer::{Diagnosis, Verdict};
+use crate::diagnose::answer::{Diagnosis, Fit, Verdict};
 
 /// One or two sentences: what is missing, how large it is, what to do.
 pub fn sentence(d: &Diagnosis) -> String {
@@ -29,7 +29,9 @@ fn explained(d: &Diagnosis) -> String {
             format!("{}{size}", lower_first(&e.name))
         })
         .collect();
-    let gain = d.fit.as_ref().map_or(String::new(), |fit| {
+    // Where the blocks held out have no part in the effect there is no fall to tell of.
+    let fell = |fit: &&Fit| norm(fit.held_out.after_rms_ng) < 0.995 * norm(fit.held_out.before_rms_ng);
+    let gain = d.fit.as_ref().filter(fell).map_or(String::new(), |fit| {
         format!(
             " With it, the misfit on data the fit has not seen falls from {} to {} ng, against noise of {} ng.",
             figure(norm(fit.held_out.before_rms_ng)),

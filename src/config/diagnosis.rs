@@ -1,0 +1,128 @@
+//! What a running diagnosis compares the recording with: which files, and how often.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::Fault;
+use super::section::Section;
+use crate::diagnose::case::{Expectation, Header, Texts};
+use crate::diagnose::catalogue;
+use crate::diagnose::error::CaseError;
+use crate::diagnose::live::Policy;
+use crate::units::MissionTime;
+
+/// Which files, and how often.
+#[derive(Debug, Clone)]
+pub struct DiagnosisConfig {
+    /// `case.toml`: the vehicle, and the names of the other files where they are not given here.
+    pub case: Option<PathBuf>,
+    /// The simulation.
+    pub simulation: Option<PathBuf>,
+    /// Orbit, attitude and environment.
+    pub ancillary: Option<PathBuf>,
+    /// The mission log.
+    pub events: Option<PathBuf>,
+    /// Keys of `case.toml` to override, `key=value`.
+    pub set: Vec<String>,
+    /// When and how to look.
+    pub policy: Policy,
+}
+
+/// The section `[diagnosis]`; `None` when it says nothing.
+pub(super) fn read(section: &mut Section<'_>, folder: &Path) -> Option<DiagnosisConfig> {
+    if section.is_silent() {
+        return None;
+    }
+    let has_case = section.has("case");
+    let case = section.existing("case", folder, true);
+    let case = case.map(|path| if path.is_dir() { path.join("case.toml") } else { path });
+    let [simulation, ancillary] = ["simulation", "ancillary"].map(|key| {
+        section.check(key, has_case || section.has(key), || {
+            format!(
+                "found nothing; a running diagnosis needs diagnosis.{key} or diagnosis.case, the directory of a case"
+            )
+        });
+        section.existing(key, folder, false)
+    });
+    let events = section.existing("events", folder, false);
+    let standard = Policy::default();
+    let policy = Policy {
+        search_every_s: section.number("search_every_s", standard.search_every_s, 25.0..=1e7),
+        claim_probability: section.number("claim_probability", standard.claim_probability, 1e-12..=0.5),
+        without: section.parsed_list("without", "an effect's id"),
+    };
+    for id in policy.without.iter().filter(|id| catalogue::by_id(id).is_none()) {
+        let known = catalogue::ALL.iter().map(|effect| effect.id).collect::<Vec<_>>().join(", ");
+        section.fault("without", format!("found {id:?}; the effects are {known}"));
+    }
+    let set = section.parsed_list("set", "key=value");
+    Some(DiagnosisConfig { case, simulation, ancillary, events, set, policy })
+}
+
+impl DiagnosisConfig {
+    /// Reads and checks the files.
+    ///
+    /// # Errors
+    /// What is wrong with each of them, all at once.
+    pub fn expectation(&self, time: &MissionTime) -> Result<Expectation, Vec<Fault>> {
+        let at = |key: &str, sentence: String| Fault { place: format!("diagnosis.{key}"), sentence };
+        let mut header = self.header(time).map_err(|sentence| vec![at("case", sentence)])?;
+        let folder = self.case.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
+        let files = &mut header.files;
+        for (named, given) in [
+            (&mut files.simulation, &self.simulation),
+            (&mut files.ancillary, &self.ancillary),
+            (&mut files.events, &self.events),
+        ] {
+            match given {
+                Some(path) => *named = path.display().to_string(),
+                None if named.is_empty() => {}
+                None => *named = folder.join(&*named).display().to_string(),
+            }
+        }
+        files.recording = "the windows so far".into();
+        let text = |name: &str| fs::read_to_string(name).ok();
+        let texts = Texts {
+            recording: None,
+            simulation: text(&files.simulation),
+            ancillary: text(&files.ancillary),
+            events: text(&files.events),
+        };
+        let mut faults = Vec::new();
+        if header.epoch_utc != time.epoch_utc {
+            let sentence = format!(
+                "its epoch_utc is {} and mission.epoch_utc is {}: one clock cannot have two zeros",
+                header.epoch_utc, time.epoch_utc
+            );
+            faults.push(at("case", sentence));
+        }
+        let files = header.files.clone();
+        match Expectation::from_texts(header, &texts) {
+            Ok(expectation) if faults.is_empty() => Ok(expectation),
+            Ok(_) => Err(faults),
+            Err(errors) => {
+                let key = |error: &CaseError| match error.file() {
+                    Some(file) if *file == files.simulation => "simulation",
+                    Some(file) if *file == files.ancillary => "ancillary",
+                    Some(file) if *file == files.events => "events",
+                    _ => "case",
+                };
+                faults.extend(errors.iter().map(|error| at(key(error), error.to_string())));
+                Err(faults)
+            }
+        }
+    }
+
+    fn header(&self, time: &MissionTime) -> Result<Header, String> {
+        let text = match &self.case {
+            Some(path) => {
+                fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?
+            }
+            None => format!(
+                "[case]\nid = \"live\"\nepoch_utc = \"{}\"\nliftoff_clock_s = {:?}\n[recording]\nkind = \"recorder_dump\"\n",
+                time.epoch_utc, time.liftoff_clock_s
+            ),
+        };
+        Header::parse(&text, &self.set).map_err(|error| error.to_string())
+    }
+}

@@ -1,0 +1,125 @@
+//! Keeps the running diagnosis beside the products, on a thread of its own.
+//!
+//! It never stands in the way of the dump port: between two looks it waits on the hub's head, a slot that holds the latest
+//! number only, so whatever came during a search is one picture afterwards, however much it was. The station is held for
+//! as long as it takes to copy the windows. What it finds lies on the desk for those who ask, and waits at the hub for the one
+//! writer to number, publish and journal it.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::runtime::Handle;
+use tokio::sync::watch;
+use tokio_util::sync::CancellationToken;
+
+use crate::diagnose::case::Expectation;
+use crate::diagnose::live::{Live, Milestones, Policy, Report, Seen};
+use crate::diagnose::recorder::usable;
+use crate::hub::desk::Desk;
+use crate::hub::wire::members;
+use crate::hub::{Body, Hub, Topic};
+use crate::ingest::writer::SharedStation;
+use crate::units::Clock;
+
+/// Called before every search, on the thread that searches: whoever wants searches at certain times only holds it here.
+pub type Gate = Arc<dyn Fn() + Send + Sync>;
+
+/// Nothing came for this long: the windows so far are looked at, however few are new.
+const QUIET: Duration = Duration::from_secs(5);
+/// Time between two pictures of the windows, while they come.
+const PAUSE: Duration = Duration::from_millis(250);
+
+/// What the thread works on.
+pub struct Diagnosing {
+    /// The windows.
+    pub station: SharedStation,
+    /// Whose head tells that there are new ones, and who is told.
+    pub hub: Arc<Hub>,
+    /// Where the report lies.
+    pub desk: Arc<Desk>,
+    /// What the windows are compared with.
+    pub expected: Expectation,
+    /// When and how to look.
+    pub policy: Policy,
+    /// Called before every search.
+    pub gate: Gate,
+    /// Cancelled when it must end; a search under way is given up within a second or so.
+    pub stop: CancellationToken,
+}
+
+impl Diagnosing {
+    /// Works until it is stopped.
+    pub fn run(self, runtime: &Handle) {
+        let Self { station, hub, desk, expected, policy, gate, stop } = self;
+        let case = expected.header.id.clone();
+        let (milestones, mut told_revision) =
+            hub.last_told(Topic::Diagnosis).and_then(|json| earlier(&json)).unwrap_or_default();
+        let mut live = match Live::new(expected, policy, milestones) {
+            Ok(live) => live,
+            Err(error) => {
+                tracing::error!(%error, "no diagnosis runs: the ancillary data defeat the physics");
+                return desk.show(Report::refused(&case, &error));
+            }
+        };
+        let mut head = hub.subscribe();
+        let mut is_coming = true;
+        while !stop.is_cancelled() {
+            head.mark_unchanged();
+            let known = usable(&station.read().expect("no holder panics"));
+            let seen = Seen::from(&known);
+            desk.show(live.report(seen.windows, false));
+            if !live.is_due(&seen, is_coming) {
+                is_coming = runtime.block_on(news(&mut head, is_coming, &stop));
+                continue;
+            }
+            desk.show(live.report(seen.windows, true));
+            gate();
+            if live.look(known, &|| stop.is_cancelled()) {
+                let report = live.report(seen.windows, false);
+                if report.progress.revision != told_revision {
+                    hub.tell(message(&report));
+                    told_revision.clone_from(&report.progress.revision);
+                }
+                desk.show(report);
+            }
+        }
+    }
+}
+
+/// Waits for something new; false when nothing came for a while. Once that is known, it waits for as long as it takes.
+async fn news(head: &mut watch::Receiver<u64>, is_coming: bool, stop: &CancellationToken) -> bool {
+    let changed = async {
+        match is_coming {
+            true => tokio::time::timeout(QUIET, head.changed()).await.is_ok(),
+            false => head.changed().await.is_ok(),
+        }
+    };
+    let pause = async {
+        let changed = changed.await;
+        if changed {
+            tokio::time::sleep(PAUSE).await;
+        }
+        changed
+    };
+    tokio::select! {
+        () = stop.cancelled() => true,
+        changed = pause => changed,
+    }
+}
+
+/// The message on topic `diagnosis`: the report but for its looks, which readers of messages have had.
+fn message(report: &Report) -> Body {
+    let mut report = report.clone();
+    report.progress.looks.clear();
+    let clock_s = report.progress.last_clock_s.unwrap_or_default();
+    let clock = Clock::from_tenths((clock_s * 10.0).round() as i64);
+    Body::Told { topic: Topic::Diagnosis, clock, json: members("diagnosis", &report) }
+}
+
+/// Milestones and revision of a message told by an earlier run.
+fn earlier(json: &str) -> Option<(Milestones, String)> {
+    let value: serde_json::Value = serde_json::from_str(&format!("{{{json}}}")).ok()?;
+    let progress = value.get("progress")?;
+    let revision = progress.get("revision")?.as_str()?.to_string();
+    Some((serde_json::from_value(progress.clone()).ok()?, revision))
+}
