@@ -14,6 +14,7 @@ use utoipa::ToSchema;
 
 use super::App;
 use super::problem::Problem;
+use crate::diagnose::live::{Report, State as Progress};
 use crate::hub::status::{Phase, counted};
 
 /// What the service says of itself. Every figure of `ingest` is of what is durable.
@@ -245,4 +246,20 @@ fn note(app: &App) {
     gauge!("oare_head_seq").set(app.hub.head_seq() as f64);
     gauge!("oare_ready").set(f64::from(u8::from(app.board.phase() == Phase::Running)));
     gauge!("oare_uptime_seconds").set(app.started.elapsed().as_secs_f64());
+    if let Some(report) = app.desk.report() {
+        note_diagnosis(&report);
+    }
+}
+
+/// A time that nothing gave, or that was taken back, is no number.
+fn note_diagnosis(report: &Report) {
+    let progress = &report.progress;
+    counter!("oare_diagnosis_searches_total").absolute(progress.milestones.searches);
+    counter!("oare_diagnosis_alarms_withdrawn_total").absolute(progress.milestones.alarms_withdrawn);
+    gauge!("oare_diagnosis_searching").set(f64::from(u8::from(progress.state == Progress::Searching)));
+    gauge!("oare_diagnosis_windows_seen").set(progress.windows_seen as f64);
+    gauge!("oare_diagnosis_windows_searched").set(progress.windows_searched as f64);
+    gauge!("oare_diagnosis_alarm").set(f64::from(u8::from(progress.milestones.alarm_clock_s.is_some())));
+    gauge!("oare_diagnosis_time_to_detect_seconds").set(progress.time_to_detect_s.unwrap_or(f64::NAN));
+    gauge!("oare_diagnosis_time_to_name_seconds").set(progress.time_to_name_s.unwrap_or(f64::NAN));
 }

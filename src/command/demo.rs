@@ -1,5 +1,5 @@
 //! `oare demo`: the whole thing with nothing prepared. A service comes up on a directory of its own, and a simulated mission is
-//! flown into its dump port, playback by playback.
+//! flown into its dump port, playback by playback; half way something begins to leak that the simulation knows nothing of.
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,10 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, anyhow};
 use oare_ground::config::Config;
 use oare_ground::ingest::wire::LinkConfig;
+use oare_ground::physics::Vec3;
 use oare_ground::service::{Service, ServiceError};
+use oare_ground::simulate::expected::case_files;
+use oare_ground::simulate::forces::Push;
 use oare_ground::simulate::recorder::{Framer, Packetiser, RecorderConfig, playbacks};
 use oare_ground::simulate::{Mission, MissionConfig};
 use tokio_util::sync::CancellationToken;
@@ -41,21 +44,31 @@ const PLAYBACK_FRAMES: usize = 320;
 /// Frames of the playback before that come again.
 const OVERLAP_FRAMES: usize = 20;
 
+/// The concealed leak, at its begin, and how it dies away.
+const LEAK_NG: [f64; 3] = [250.0, -120.0, 300.0];
+const LEAK_TAU_S: f64 = 9000.0;
+
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
     super::log_to_stderr();
-    let mission = match Mission::new(MissionConfig::sts65(args.seed, args.hours)) {
-        Ok(mission) => mission,
+    let planned = concealing(MissionConfig::sts65(args.seed, args.hours));
+    let flown = Mission::new(planned).and_then(|mission| Ok((case_files(&mission, "demo", "the dump port")?, mission)));
+    let (case, mission) = match flown {
+        Ok(flown) => flown,
         Err(problems) => {
             problems.iter().for_each(|problem| eprintln!("oare demo: {problem}"));
             return Ok(super::unusable());
         }
     };
     let data = Scratch::new()?;
+    for (name, text) in case {
+        std::fs::write(data.0.join(name), text)?;
+    }
     super::runtime()?.block_on(async {
         let service = start(&args, &data.0).await?;
         println!("dashboard: http://{}/", service.http_address);
         println!("latest value: curl http://{}/accel", service.http_address);
+        println!("what the simulation lacks, as it shows: curl http://{}/diagnosis", service.http_address);
         println!("dump port: {}; Ctrl-C ends", service.ingest_address);
         let landed = CancellationToken::new();
         let (to, over) = (service.ingest_address, landed.clone());
@@ -66,6 +79,18 @@ pub fn run(args: Args) -> Result<ExitCode> {
         service.drain().await?;
         Ok(super::DONE)
     })
+}
+
+/// The mission with a leak half way, of which the simulation that the service compares with knows nothing.
+fn concealing(mut config: MissionConfig) -> MissionConfig {
+    let (from_s, until_s) = (f64::from(config.start_clock_s), f64::from(config.end_clock_s()));
+    config.forces.pushes.push(Push {
+        from_clock_s: (0.5 * (from_s + until_s)).round(),
+        until_clock_s: f64::INFINITY,
+        tau_s: Some(LEAK_TAU_S),
+        body_ng: Vec3::from(LEAK_NG),
+    });
+    config
 }
 
 /// A directory that goes with the demonstration.
@@ -87,7 +112,7 @@ impl Drop for Scratch {
 
 /// The service at the addresses asked for, or on free ports where one of them is busy.
 async fn start(args: &Args, data: &Path) -> Result<Service> {
-    let mut config = Config::standard();
+    let mut config = Config::from_toml_in("[diagnosis]\ncase = \".\"\n", data)?;
     config.data_dir = data.to_path_buf();
     config.ingest.address = args.ingest;
     config.http.address = args.http;

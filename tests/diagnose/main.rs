@@ -1,5 +1,7 @@
 //! The diagnosis on the open cases, and its refusals. Shared data are read where they are; absent, the claim is skipped aloud.
 
+mod separating;
+
 use std::path::PathBuf;
 
 use oare_ground::diagnose::answer::Verdict;

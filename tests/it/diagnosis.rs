@@ -124,6 +124,11 @@ async fn a_concealed_leak_is_named_as_the_windows_come_and_everybody_is_told() {
     assert!((alarm_s - value - to_detect_s).abs() < 1e-6 && to_detect_s > 0.0, "{progress:#}");
     assert!(progress["time_to_name_s"].as_f64().unwrap() >= to_detect_s);
 
+    let metrics = reqwest::get(running.url("/metrics")).await.unwrap().text().await.unwrap();
+    for name in ["searches_total", "windows_searched", "alarm 1", "time_to_detect_seconds", "time_to_name_seconds"] {
+        assert!(metrics.contains(&format!("oare_diagnosis_{name}")), "{name} is not in: {metrics}");
+    }
+
     let mut told = live.next().await.unwrap();
     let mut prev = told["prev"].as_u64();
     while told["verdict"] != "explained" {

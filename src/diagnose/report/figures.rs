@@ -10,7 +10,10 @@ type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = Result<String, String>;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-const WIDTH: u32 = 980;
+/// On A4 paper a pixel of this is two thirds of a point: the smallest letters are then 7 pt high.
+const WIDTH: u32 = 760;
+/// The drawing library makes letters smaller by this than what they are ordered as.
+const LETTERS: f64 = 1.24;
 const GREY: RGBColor = RGBColor(140, 140, 140);
 const INK: RGBColor = RGBColor(40, 40, 40);
 const CLAIM: RGBColor = RGBColor(178, 58, 46);
@@ -20,7 +23,7 @@ const SHADOW: RGBAColor = RGBAColor(70, 90, 130, 0.10);
 const LINE_S: f64 = 600.0;
 
 fn text(size: u32) -> TextStyle<'static> {
-    TextStyle::from(("Helvetica, Arial, sans-serif", size).into_font()).color(&INK)
+    TextStyle::from(("Helvetica, Arial, sans-serif", LETTERS * f64::from(size)).into_font()).color(&INK)
 }
 
 fn on_canvas(height: u32, draw: impl FnOnce(&Canvas) -> Result<(), String>) -> Drawn {
@@ -98,7 +101,7 @@ fn timelines<'p>(plates: &'p Plates, lines: impl Fn(usize) -> Vec<Line<'p>>) -> 
                 .x_labels(0)
                 .y_labels(5)
                 .y_desc(format!("{}, ng", AXES[axis]))
-                .axis_desc_style(text(14))
+                .axis_desc_style(text(12))
                 .label_style(text(12))
                 .y_label_formatter(&|y| format!("{y:.0}"))
                 .draw()
@@ -119,11 +122,11 @@ fn timelines<'p>(plates: &'p Plates, lines: impl Fn(usize) -> Vec<Line<'p>>) -> 
 
 fn legend(panel: &Canvas, lines: &[Line]) -> Result<(), String> {
     for (k, (colour, width, _, words)) in lines.iter().enumerate() {
-        let x = 80 + 230 * k as i32;
+        let x = 76 + 225 * k as i32;
         panel.draw(&PathElement::new([(x, 18), (x + 24, 18)], colour.stroke_width(*width + 1))).map_err(said)?;
         panel.draw(&Text::new(*words, (x + 30, 11), text(12))).map_err(said)?;
     }
-    let x = 80 + 230 * lines.len() as i32;
+    let x = 76 + 225 * lines.len() as i32;
     panel.draw(&Rectangle::new([(x, 11), (x + 24, 25)], SHADOW.filled())).map_err(said)?;
     panel.draw(&Text::new("in the Earth's shadow", (x + 30, 11), text(12))).map_err(said)
 }
@@ -147,7 +150,7 @@ fn log_strip(plates: &Plates, area: &Canvas, time: std::ops::Range<f64>) -> Resu
         .y_labels(0)
         .x_labels(12)
         .x_desc("hours since lift-off")
-        .axis_desc_style(text(14))
+        .axis_desc_style(text(12))
         .label_style(text(12))
         .x_label_formatter(&|x| format!("{x:.0}"))
         .draw()
@@ -181,11 +184,12 @@ pub fn covariates(plates: &Plates) -> Drawn {
     };
     let by = |size: &dyn Fn(&usize) -> f64| (0..3).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
     let axis = if (0..3).any(|a| claimed(&a) > 0.0) { by(&claimed) } else { by(&swing) };
-    let rows = shown.len().div_ceil(3);
+    let columns = if shown.len() > 4 { 3 } else { 2 };
+    let rows = shown.len().div_ceil(columns);
     on_canvas(40 + 210 * rows as u32, |canvas| {
-        let title = format!("Residual on {} against what it may follow: before (grey), after (blue)", AXES[axis]);
-        let canvas = canvas.titled(&title, text(14)).map_err(said)?;
-        for (panel, covariate) in canvas.split_evenly((rows, 3)).iter().zip(&shown) {
+        let title = format!("Residual on {} against what it may follow: before (pale), after (dark)", AXES[axis]);
+        let canvas = canvas.titled(&title, text(12)).map_err(said)?;
+        for (panel, covariate) in canvas.split_evenly((rows, columns)).iter().zip(&shown) {
             let before = binned(&covariate.values, &plates.before_ng[axis], 24);
             let after = binned(&covariate.values, &left[axis], 24);
             let unit = if covariate.unit.is_empty() { String::new() } else { format!(", {}", covariate.unit) };
@@ -219,7 +223,7 @@ fn panel_of_bins(panel: &Canvas, name: &str, before: &[Bin], after: &[Bin]) -> R
         .light_line_style(TRANSPARENT)
         .bold_line_style(GREY.mix(0.25))
         .axis_style(GREY)
-        .x_labels(5)
+        .x_labels(4)
         .y_labels(5)
         .x_desc(name)
         .y_desc("ng")
@@ -267,7 +271,7 @@ pub fn spectrum(plates: &Plates) -> Drawn {
                 .x_labels(if bottom { 7 } else { 0 })
                 .y_labels(4)
                 .y_desc(format!("{}, ng", AXES[axis]))
-                .axis_desc_style(text(14))
+                .axis_desc_style(text(12))
                 .label_style(text(12));
             if bottom {
                 mesh.x_desc("cycles per orbit").x_label_formatter(&|x| format!("{x:.0}"));
@@ -308,7 +312,7 @@ pub fn ladder(plates: &Plates) -> Drawn {
             .axis_style(GREY)
             .y_labels(0)
             .x_desc("log evidence against nothing")
-            .axis_desc_style(text(13))
+            .axis_desc_style(text(12))
             .label_style(text(12))
             .x_label_formatter(&|x| format!("{x:.0}"))
             .draw()
@@ -319,7 +323,7 @@ pub fn ladder(plates: &Plates) -> Drawn {
             let bar = Rectangle::new([(0.0, row + 0.25), (*evidence, row + 0.75)], colour.filled());
             chart.draw_series([bar]).map_err(said)?;
             let y = 4 + (26.0 * k as f64 + 6.0) as i32;
-            canvas.draw(&Text::new(name.replace('_', " "), (4, y), text(12))).map_err(said)?;
+            canvas.draw(&Text::new(name.replace('_', " "), (4, y), text(11))).map_err(said)?;
             let x = chart.backend_coord(&(evidence.max(0.0), row)).0;
             canvas.draw(&Text::new(format!("{evidence:.1}"), (x + 6, y), text(12))).map_err(said)?;
         }

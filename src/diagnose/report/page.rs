@@ -9,7 +9,7 @@ use crate::diagnose::answer::{Diagnosis, EffectAnswer, Verdict};
 const STYLE: &str = "
 :root { --ink: #222; --soft: #666; --rule: #d5d5d5; --claim: #b23a2e; }
 * { box-sizing: border-box; }
-body { font: 15px/1.5 Georgia, 'Times New Roman', serif; color: var(--ink); max-width: 1020px; margin: 2.2em auto; padding: 0 1.2em; }
+body { font: 15px/1.5 Georgia, 'Times New Roman', serif; color: var(--ink); max-width: 900px; margin: 2.2em auto; padding: 0 1.2em; }
 h1 { font-size: 1.55em; font-weight: normal; margin: 0 0 .1em; }
 h2 { font-size: 1.1em; margin: 2em 0 .5em; border-bottom: 1px solid var(--rule); padding-bottom: .2em; }
 p { margin: .5em 0; max-width: 48em; }
@@ -23,7 +23,7 @@ td.n, th.n { text-align: right; }
 figure { margin: 1em 0 1.4em; page-break-inside: avoid; break-inside: avoid; }
 figure svg { width: 100%; height: auto; display: block; }
 figcaption { color: var(--soft); font-size: .9em; max-width: 52em; }
-.columns { columns: 2; column-gap: 3em; } .columns table { width: 100%; break-inside: auto; }
+.columns { columns: 2; column-gap: 3em; } .columns table { width: 100%; break-inside: auto; margin-top: 0; }
 footer { margin-top: 3em; border-top: 1px solid var(--rule); color: var(--soft); font-size: .85em; }
 @page { size: A4; margin: 16mm 15mm; }
 @media print {
@@ -74,7 +74,7 @@ pub fn page(d: &Diagnosis, plates: &Plates, figures: &[(&'static str, String)], 
         &mut page,
         figures,
         "spectrum.svg",
-        "Amplitude of one sine at each frequency, in cycles per orbit, before (grey) and after (blue).",
+        "Amplitude of one sine at each frequency, in cycles per orbit, before (pale) and after (dark).",
     );
     competition(&mut page, d);
     figure_of(
