@@ -54,15 +54,21 @@ fn median(mut times: Vec<Duration>) -> Duration {
 fn rederive(settings: &Settings) -> Derived {
     let mission = Mission::new(MissionConfig::sts65(1, HOURS)).unwrap_or_else(|problems| panic!("{problems:?}"));
     let mut flown = Flown { archive: Archive::default(), windows: BTreeMap::new() };
-    let last_s = mission.fly().schedule().segments.last().map_or(0, |segment| segment.from_s) - 1800;
+    let last_s = {
+        let flight = mission.fly();
+        let segments = &flight.schedule().segments;
+        let id = segments.last().map(|segment| segment.calibration_id);
+        segments.iter().find(|segment| Some(segment.calibration_id) == id).map_or(0, |first| first.from_s) - 60
+    };
     let mut late = Vec::new();
     let mut sequence = 0u16;
     for second in mission.fly() {
         for sent in second.sent {
             sequence = (sequence + 1) & 0x3fff;
-            match second.clock_s < last_s {
-                true => drop(flown.archive.add(sent.record, sequence)),
-                false => late.push((sent.record, sequence)),
+            if second.clock_s < last_s {
+                flown.archive.add(sent.record, sequence);
+            } else {
+                late.push((sent.record, sequence));
             }
         }
     }

@@ -55,6 +55,9 @@ const CHECK_CELLS: usize = 144;
 /// And no fewer than this share of all cells, so that the checks of a mission that comes down at once cost little.
 const CHECK_SHARE: usize = 8;
 
+/// Tenths of a second in which the end of a calibration is noticed at once; if all of them are lost, the next check does.
+const OVER_TENTHS: i64 = 600;
+
 /// Frames in, changes out, products at any time.
 pub struct Station {
     settings: Settings,
@@ -71,6 +74,9 @@ pub struct Station {
     touched: BTreeSet<i64>,
     /// Whether anything that calibration depends on is new.
     calibration_touched: bool,
+    /// Latest record, and latest one that is not of normal mode.
+    latest: Option<Clock>,
+    latest_calibrating: Option<Clock>,
     /// Whether anything is new that the checks of the calibration look at, and in how many cells; they wait for the next
     /// calibration, for [`CHECK_CELLS`] or for [`Station::flush`].
     checks_touched: bool,
@@ -107,6 +113,8 @@ impl Station {
             products: BTreeMap::new(),
             touched: BTreeSet::new(),
             calibration_touched: true,
+            latest: None,
+            latest_calibrating: None,
             checks_touched: false,
             cells_unchecked: 0,
             unannounced: BTreeSet::new(),
@@ -234,11 +242,23 @@ impl Station {
             Some((clock, mode)) => {
                 self.ledger.seconds.add(clock);
                 self.touched.insert(cell_of(clock));
-                self.calibration_touched |= mode != Mode::Normal;
+                self.calibration_touched |= self.ends_calibration(clock, mode);
                 self.checks_touched = true;
             }
             None => self.checks_touched = true,
         }
+    }
+
+    /// Whether this record completes a calibration, or belongs to one that is complete.
+    fn ends_calibration(&mut self, clock: Clock, mode: Mode) -> bool {
+        self.latest = self.latest.max(Some(clock));
+        let before = |later: Option<Clock>| later.map_or(0, |later| later.tenths() - clock.tenths());
+        if mode != Mode::Normal {
+            self.latest_calibrating = self.latest_calibrating.max(Some(clock));
+            return before(self.latest) >= calibration::CALIBRATION_OVER_TENTHS;
+        }
+        let since = -before(self.latest_calibrating);
+        (0..OVER_TENTHS).contains(&(since - calibration::CALIBRATION_OVER_TENTHS))
     }
 
     /// Frames that must not be used although they were, because another variant of them counts more. When there are any, the

@@ -3,13 +3,15 @@
 //! whole, `OARE_SEEDS=20` that many seeds.
 
 use oare_ground::ingest::wire::{PlaybackPart, PlaybackReader};
-use oare_ground::pipeline::calibration::{AnomalyKind, Derived};
+use oare_ground::pipeline::archive::Archive;
+use oare_ground::pipeline::calibration::{AnomalyKind, Derived, range_corrections_as_of};
 use oare_ground::pipeline::station::replay;
 use oare_ground::pipeline::{PlaybackId, Settings, Station};
-use oare_ground::simulate::MissionConfig;
+use oare_ground::simulate::{Fault, Mission, MissionConfig};
 use oare_ground::telemetry::{Axis, Quality, Range};
+use oare_ground::units::Clock;
 
-use super::flown::fly;
+use super::flown::{derive_all, fly};
 use super::shared_data;
 
 fn station_of(name: &str) -> Option<Station> {
@@ -77,4 +79,35 @@ fn one_day_with_its_manoeuvre_has_an_honest_bias_and_no_false_anomaly() {
             assert!((counts - truth).abs() < 4.5 * sigma, "{axis:?} at {clock_s}: {counts} +- {sigma}, true {truth}");
         }
     }
+}
+
+#[test]
+fn what_was_answered_at_any_instant_is_given_again_as_of_it() {
+    let mut config = MissionConfig::sts65(11, 14.0);
+    let start_s = config.start_clock_s;
+    config.faults.push(Fault::RangeMisreport { from_clock_s: start_s + 18_000, seconds: 7200 });
+    let mission = Mission::new(config).unwrap_or_else(|problems| panic!("{problems:?}"));
+    // Before, in and right after a calibration, while its scale part runs, in the misreported span, and later.
+    let asked_h = [0.4, 0.45, 0.7, 4.4, 4.48, 4.55, 5.5, 6.3, 8.6, 8.75, 10.0, 13.9];
+    let mut asked: Vec<u32> = asked_h.iter().map(|h| start_s + (h * 3600.0) as u32).collect();
+    let mut archive = Archive::default();
+    let mut answers = Vec::new();
+    for (n, second) in mission.fly().enumerate() {
+        for sent in second.sent {
+            archive.add(sent.record, n as u16 & 0x3fff);
+        }
+        if asked.first() == Some(&second.clock_s) {
+            let (_, derived) = derive_all(&archive);
+            answers.push((Clock::from_seconds(asked.remove(0).into()), derived));
+        }
+    }
+    let (windows, whole) = derive_all(&archive);
+    assert_eq!(answers.len(), asked_h.len());
+    for (at, then) in &answers {
+        assert_eq!(then.current(), whole.as_of(*at), "at {}", at.seconds());
+        let corrections = range_corrections_as_of(&archive, &windows, &whole, *at);
+        assert_eq!(then.range_corrections, corrections, "at {}", at.seconds());
+    }
+    assert!(answers.iter().any(|(_, then)| !then.range_corrections.is_empty()), "the fault is seen");
+    assert_eq!(answers.last().map(|(_, then)| then.timeline.len()), Some(4));
 }

@@ -18,7 +18,7 @@ const BIAS_SIGMA_NG: [f64; 3] = [48.0, 24.0, 14.0];
 struct Tally {
     bias: [f64; 3],
     acceleration: [f64; 3],
-    scale: f64,
+    scale: [f64; 3],
     bias_error2_ng2: [f64; 3],
     bias_sigma_ng: [f64; 3],
 }
@@ -60,13 +60,13 @@ fn tally(flown: &Flown) -> Tally {
             Some((found.trimmed_ng.0[i] - truth.body_ng[i]).abs() < 2.0 * found.sigma_ng.0[i])
         }));
     }
-    tally.scale = share(Axis::ALL.into_iter().flat_map(|axis| {
-        Range::ALL.into_iter().map(move |range| {
+    tally.scale = Axis::ALL.map(|axis| {
+        share(Range::ALL.into_iter().map(|range| {
             let found = current.scale[axis.index()][range.index()];
             let truth = instrument.scale_correction[axis.index()][range.index()];
             (found.correction - truth).abs() < 2.0 * found.sigma
-        })
-    }));
+        }))
+    });
     tally
 }
 
@@ -83,20 +83,22 @@ fn pooled(name: &str, first_seed: u64, seeds: u64, config: impl Fn(u64) -> Missi
     let tallies: Vec<Tally> =
         (first_seed..first_seed + seeds).into_par_iter().map(|seed| tally(&fly(config(seed)))).collect();
     println!("{name}, {seeds} seeds from {first_seed}: share inside two standard errors (its error over missions), %");
-    println!("axis  bias, range C   acceleration    bias: rms error, mean sigma, ng");
+    println!("axis  bias, range C  acceleration  scale, 3 ranges  bias: rms error, mean sigma, ng");
     let percent = |[mean, error]: [f64; 2]| format!("{:5.1} ({:3.1})", 100.0 * mean, 100.0 * error);
     for axis in Axis::ALL {
         let i = axis.index();
         println!(
-            "{}     {}     {}     {:5.1} {:5.1}",
+            "{}     {}    {}   {}      {:5.1} {:5.1}",
             axis.letter().to_uppercase(),
             percent(mean(tallies.iter().map(|t| t.bias[i]))),
             percent(mean(tallies.iter().map(|t| t.acceleration[i]))),
+            percent(mean(tallies.iter().map(|t| t.scale[i]))),
             mean(tallies.iter().map(|t| t.bias_error2_ng2[i]))[0].sqrt(),
             mean(tallies.iter().map(|t| t.bias_sigma_ng[i]))[0],
         );
     }
-    println!("scale factors, all axes and ranges: {}", percent(mean(tallies.iter().map(|t| t.scale))));
+    let scale = mean(tallies.iter().map(|t| t.scale.iter().sum::<f64>() / 3.0));
+    println!("scale factors, all axes and ranges: {}", percent(scale));
     tallies
 }
 
@@ -108,8 +110,8 @@ fn hold(tallies: &[Tally]) {
     for i in 0..3 {
         holds("bias", mean(tallies.iter().map(|t| t.bias[i])));
         holds("acceleration", mean(tallies.iter().map(|t| t.acceleration[i])));
+        holds("scale", mean(tallies.iter().map(|t| t.scale[i])));
     }
-    holds("scale", mean(tallies.iter().map(|t| t.scale)));
 }
 
 #[test]

@@ -34,7 +34,6 @@ impl Flown {
 /// Flies a mission.
 pub fn fly(config: MissionConfig) -> Flown {
     let mission = Mission::new(config).unwrap_or_else(|problems| panic!("{problems:?}"));
-    let settings = Settings::sts65();
     let (mut archive, mut builder, mut truth) = (Archive::default(), TruthBuilder::default(), BTreeMap::new());
     let mut sequence = 0u16;
     for second in mission.fly() {
@@ -44,15 +43,22 @@ pub fn fly(config: MissionConfig) -> Flown {
             sequence = sequence.wrapping_add(1) & 0x3fff;
         }
     }
+    let (windows, derived) = derive_all(&archive);
+    Flown { windows, derived, truth, mission }
+}
+
+/// Windows of an archive, and what is derived from them.
+pub fn derive_all(archive: &Archive) -> (BTreeMap<i64, Window>, Derived) {
+    let settings = Settings::sts65();
     let mut held = BTreeMap::new();
     let cells: Vec<i64> = archive.cells().collect();
-    windows(&archive, cells, &settings.window, |cell, window| {
+    windows(archive, cells, &settings.window, |cell, window| {
         if let Some(window) = window {
             held.insert(cell, window);
         }
     });
-    let derived = calibration::derive(&archive, &held, &settings, None, None);
-    Flown { windows: held, derived, truth, mission }
+    let derived = calibration::derive(archive, &held, &settings, None, None);
+    (held, derived)
 }
 
 /// How many seeds: a part by default, the whole with `OARE_SEEDS=all`, any number with that number.

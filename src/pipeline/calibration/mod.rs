@@ -45,8 +45,10 @@ use super::window::Window;
 use crate::telemetry::{Axis, Range};
 use crate::units::Clock;
 
-/// Calibrations further apart than this are two, tenths of a second: one lasts 15 min, with its scale part 37.
-const CALIBRATION_APART_TENTHS: i64 = 36_000;
+/// Tenths of a second without a step of the table after which a calibration is over: its steps follow each other faster, and the
+/// levels around it that tell whether it was disturbed are known by then. A version is known since then and not before, so that
+/// whoever asked at any instant was given what is given later as of that instant.
+pub const CALIBRATION_OVER_TENTHS: i64 = (unsteady::AROUND_S * 10.0) as i64;
 
 /// Everything that calibration and its checks derive from an archive.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -129,7 +131,7 @@ pub fn derive(
         walks,
         ..Derived::default()
     };
-    let ends = ends(&pairs, &scales);
+    let ends = ends(archive, &holds, &pairs, &scales);
     for (n, known_since) in ends.iter().enumerate() {
         let noise = history.at(*known_since, configured);
         let signature = signature(&holds, &pairs, &scales, *known_since, &noise, settings);
@@ -168,17 +170,26 @@ pub fn derive(
     derived
 }
 
-/// Clocks at which a calibration was complete, or as far as it came down.
-fn ends(pairs: &[Pair<'_, '_>], scales: &[ScaleSequence]) -> Vec<Clock> {
-    let mut known: Vec<Clock> =
-        pairs.iter().map(|p| p.opposite.last()).chain(scales.iter().map(|s| s.span[1])).collect();
-    known.sort_unstable();
-    let mut ends: Vec<Clock> = Vec::new();
-    for clock in known {
-        match ends.last_mut() {
-            Some(end) if clock.tenths() - end.tenths() < CALIBRATION_APART_TENTHS => *end = clock,
-            _ => ends.push(clock),
+/// Clocks at which a calibration with anything to measure was over.
+fn ends(archive: &Archive, holds: &[Hold<'_>], pairs: &[Pair<'_, '_>], scales: &[ScaleSequence]) -> Vec<Clock> {
+    let Some((_, behind_latest)) = archive.span() else { return Vec::new() };
+    let apart = |pair: &[Hold<'_>]| pair[1].start().tenths() - pair[0].last().tenths() > CALIBRATION_OVER_TENTHS;
+    let measured = |from: Clock, to: Clock| {
+        let inside = |clock: Clock| from <= clock && clock <= to;
+        pairs.iter().any(|p| inside(p.opposite.last())) || scales.iter().any(|s| inside(s.span[1]))
+    };
+    let mut ends = Vec::new();
+    let mut first = 0;
+    for last in 0..holds.len() {
+        if last + 1 < holds.len() && !apart(&holds[last..last + 2]) {
+            continue;
         }
+        let (from, to) = (holds[first].start(), holds[last].last());
+        let over = to.plus_tenths(CALIBRATION_OVER_TENTHS);
+        if over < behind_latest && measured(from, to) {
+            ends.push(over);
+        }
+        first = last + 1;
     }
     ends
 }

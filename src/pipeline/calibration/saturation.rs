@@ -2,14 +2,15 @@
 //!
 //! A jet or a bump drives range C to its rail for a moment, and within 5 s the instrument takes a coarser range: that is how
 //! it is meant to work, and the samples are flagged anyway. It is told as a saturation when it lasts for a second and is none of
-//! that: it outlasts autoranging, or happens in range A, or comes faster than the 1 Hz filter lets an overload rise.
+//! that: it outlasts autoranging, or happens in range A, or comes faster than the 1 Hz filter lets an overload rise. While the
+//! table turns, its own acceleration may hold an axis at the rail: then only the last of these counts.
 
 use std::collections::BTreeMap;
 
 use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 use crate::pipeline::archive::Archive;
 use crate::pipeline::window::Window;
-use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range};
+use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, Step};
 use crate::units::Clock;
 
 /// Shorter ones are not told, samples: a second.
@@ -33,6 +34,7 @@ struct Run {
     abrupt: bool,
     range: Range,
     mode: Mode,
+    turning: bool,
 }
 
 /// The saturations, in order of time.
@@ -47,9 +49,6 @@ pub fn find(archive: &Archive, windows: &BTreeMap<i64, Window>, corrections: &[R
     let mut runs: Vec<Run> = Vec::new();
     let mut last: [Option<(Clock, i16)>; 3] = [None; 3];
     for record in cells.into_iter().flat_map(|cell| archive.cell(cell)) {
-        if !matches!(record.mode, Mode::Normal | Mode::Reentry) {
-            continue;
-        }
         for axis in Axis::ALL {
             add(&mut runs, record, axis, &mut last[axis.index()]);
         }
@@ -72,6 +71,7 @@ fn add(runs: &mut Vec<Run>, record: &AccRecord, axis: Axis, last: &mut Option<(C
                 Some(run) if clock.tenths() - run.to.tenths() < APART_TENTHS && run.mode == record.mode => {
                     run.to = clock.plus_tenths(1);
                     run.samples += 1;
+                    run.turning |= is_turning(record);
                 }
                 _ => runs.push(Run {
                     axis,
@@ -81,11 +81,17 @@ fn add(runs: &mut Vec<Run>, record: &AccRecord, axis: Axis, last: &mut Option<(C
                     abrupt: step > STEP_COUNTS,
                     range: record.ranges[axis.index()],
                     mode: record.mode,
+                    turning: is_turning(record),
                 }),
             }
         }
         *last = Some((clock, count));
     }
+}
+
+fn is_turning(record: &AccRecord) -> bool {
+    let rests = matches!(record.step, Step::Normal | Step::Opposite | Step::PreRate | Step::PostRate);
+    record.table_moving || matches!(record.mode, Mode::Bias | Mode::Scale) && !rests
 }
 
 fn is_told(run: &Run, corrections: &[RangeCorrection]) -> bool {
@@ -94,7 +100,7 @@ fn is_told(run: &Run, corrections: &[RangeCorrection]) -> bool {
         .find(|c| c.axis == run.axis && c.from.plus_tenths(-50) <= run.from && run.from < c.to.plus_tenths(50))
         .map_or(run.range, |c| c.actual);
     let outlasts = run.to.tenths() - run.from.tenths() > AUTORANGE_TENTHS && run.samples as i64 > AUTORANGE_TENTHS;
-    run.samples >= SAMPLES_MIN && (outlasts || run.abrupt || corrected == Range::A)
+    run.samples >= SAMPLES_MIN && (run.abrupt || !run.turning && (outlasts || corrected == Range::A))
 }
 
 fn tell(run: &Run) -> Anomaly {

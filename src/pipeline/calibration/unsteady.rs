@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use super::scale_factor::ScaleSequence;
 use super::sequence::Hold;
 use super::two_position::Pair;
-use crate::math::robust::rounding_error_spread;
+use crate::math::robust::{rounding_error_spread, rounding_error_trimmed};
 use crate::pipeline::settings::Settings;
 use crate::pipeline::window::Window;
 use crate::telemetry::{Axis, Mode, Quality, Range, Step};
@@ -24,7 +24,9 @@ const CALIBRATION_S: f64 = 1000.0;
 /// Sequences of one scale calibration lie this close, s: it takes 1293.
 const SCALE_CALIBRATION_S: f64 = 1500.0;
 /// Windows and scale holds this close to the calibration take part, s.
-const AROUND_S: f64 = 260.0;
+pub(super) const AROUND_S: f64 = 260.0;
+/// Smallest scatter told apart, counts.
+const SCATTER_COUNTS_MIN: f64 = 0.3;
 /// Seconds between the middles of the two positions.
 const POSITIONS_S: f64 = 75.0;
 /// Logarithm of the likelihood ratio from which a walk counts. Under a steady signal twice the ratio is chi squared with one
@@ -81,17 +83,24 @@ pub(super) fn excess(
         let count = pairs[first..].iter().take_while(|p| p.normal.start().seconds() - start_s < CALIBRATION_S).count();
         let of_calibration = &pairs[first..first + count];
         let around = around(holds, of_calibration);
-        for axis in Axis::ALL {
+        let normals: Vec<&Hold<'_>> = of_calibration.iter().map(|pair| pair.normal).collect();
+        let variances = Axis::ALL.map(|axis| {
             let mut readings = readings(of_calibration, axis, settings);
             readings.extend(around.iter().filter_map(|hold| reading(hold, axis, SHARED_BIAS, 1.0, settings)));
             let span_s = [start_s, of_calibration[count - 1].opposite.last().seconds()];
-            readings.extend(window_readings(span_s, windows, axis, settings));
-            let variance = made.of(previous, &readings);
-            found[first..first + count].iter_mut().for_each(|of_pair| of_pair[axis.index()] = variance);
-        }
+            readings.extend(window_readings(span_s, &normals, windows, axis, settings));
+            made.of(previous, &readings)
+        });
+        found[first..first + count].fill([as_one(variances); 3]);
         first += count;
     }
     found
+}
+
+/// The Orbiter turns as one body: an axis is as unsteady as the one that shows it most. An axis whose signal changes by the same
+/// amount in both positions of a turn about it does not show that it is unsteady.
+fn as_one(variances_ng2: [f64; 3]) -> f64 {
+    variances_ng2.into_iter().fold(0.0, f64::max)
 }
 
 /// The same during the scale calibrations, squared counts of each sequence's own range, put into the sequences. Only the levels
@@ -134,7 +143,7 @@ pub(super) fn of_scales(
                     reading(hold, axis, bias, 1.0, settings)
                 })
                 .collect();
-            readings.extend(window_readings([start.seconds(), end.seconds()], windows, axis, settings));
+            readings.extend(window_readings([start.seconds(), end.seconds()], &inside, windows, axis, settings));
             made.of(previous, &readings)
         });
         for sequence in of_calibration {
@@ -147,6 +156,8 @@ pub(super) fn of_scales(
 
 /// The bias of range C outside the bias calibration; those of targets 1 and 2 by range come before.
 const SHARED_BIAS: usize = 6;
+/// From here on, by range: the biases of windows that name range C and were taken in another.
+const OTHER_RANGE_BIAS: usize = 7;
 
 fn readings(pairs: &[Pair<'_, '_>], axis: Axis, settings: &Settings) -> Vec<Reading> {
     let mut found = Vec::new();
@@ -183,24 +194,46 @@ fn reading(hold: &Hold<'_>, axis: Axis, bias: usize, sign: f64, settings: &Setti
     Some(Reading { clock_s: hold.centre_s(), ng, variance_ng2: error_ng * error_ng, bias, sign })
 }
 
-/// Whole windows in range C that do not overlap, before and after.
+/// The range of which a window's scatter is, against that of levels whose range was commanded. Ranges differ by ten and more in
+/// what a count means; quiet and busy times by far less.
+fn range_of_scatter(scatter_counts: f64, axis: Axis, levels_ng: f64, settings: &Settings) -> Range {
+    let off = |range: Range| {
+        let ng = scatter_counts.max(SCATTER_COUNTS_MIN) * settings.instrument.resolution_ng(axis, range);
+        (ng / levels_ng).ln().abs()
+    };
+    Range::ALL.into_iter().min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(Range::C)
+}
+
+/// Whole windows that name range C and do not overlap, before and after, as far as they are known when the calibration is.
 fn window_readings(
     [start_s, end_s]: [f64; 2],
+    levels: &[&Hold<'_>],
     windows: &BTreeMap<i64, Window>,
     axis: Axis,
     settings: &Settings,
 ) -> Vec<Reading> {
     let cell = |clock_s: f64| (clock_s / 25.0).floor() as i64;
-    let resolution = settings.instrument.resolution_ng(axis, Range::C);
     let factor = settings.window.correlated_samples.sqrt();
+    let levels_ng = levels
+        .iter()
+        .filter(|hold| hold.range(axis) == Range::C)
+        .filter_map(|hold| hold.mean(axis, settings.window.samples_min))
+        .map(|mean| mean.winsorised_sd.max(SCATTER_COUNTS_MIN) * settings.instrument.resolution_ng(axis, Range::C))
+        .min_by(f64::total_cmp);
     windows
         .range(cell(start_s - AROUND_S)..=cell(end_s + AROUND_S))
         .filter(|(cell, window)| *cell % 2 == 0 && window.quality == Quality::GOOD)
+        .filter(|(_, window)| window.known_since.seconds() <= end_s + AROUND_S)
         .filter_map(|(_, window)| {
-            let seen = window.axes[axis.index()].filter(|seen| seen.range == Range::C)?;
-            let error_ng = resolution * factor * seen.estimate.independent_standard_error();
-            let (clock_s, ng) = (window.centre_s(), resolution * seen.estimate.mean);
-            Some(Reading { clock_s, ng, variance_ng2: error_ng * error_ng, bias: SHARED_BIAS, sign: 1.0 })
+            let seen = window.axes[axis.index()].filter(|seen| seen.range == Range::C)?.estimate;
+            let taken_in = |levels_ng| range_of_scatter(seen.winsorised_sd, axis, levels_ng, settings);
+            let range = levels_ng.map_or(Range::C, taken_in);
+            let bias = if range == Range::C { SHARED_BIAS } else { OTHER_RANGE_BIAS + range.index() };
+            let resolution = settings.instrument.resolution_ng(axis, range);
+            let noise = factor * seen.independent_standard_error();
+            let error_ng = resolution * noise.hypot(rounding_error_trimmed(seen.winsorised_sd));
+            let (clock_s, ng) = (window.centre_s(), resolution * seen.mean);
+            Some(Reading { clock_s, ng, variance_ng2: error_ng * error_ng, bias, sign: 1.0 })
         })
         .collect()
 }
