@@ -115,10 +115,6 @@ fn what_a_triad_of_another_kind_lacks_is_found_with_errors_that_hold() {
         let mut ids: Vec<&str> = answer.effects.iter().map(|e| e.id.as_str()).collect();
         ids.sort_unstable();
         named += usize::from(ids == ["bias", "non_orthogonality", "scale_factor"]);
-        println!(
-            answer.fit.after.rms_total,
-            answer.arcs[0].fitted, answer.verdict, truth.bias, truth.scale, truth.angle, answer.arcs[0]
-        );
         assert!(answer.fit.after.rms_total < 0.002, "{}", answer.fit.after.rms_total);
         for effect in &answer.effects {
             let true_values = match effect.id.as_str() {
