@@ -3,7 +3,8 @@
 //! The statistic is the log posterior odds of the best hypothesis against none, the noise fitted anew for every
 //! hypothesis: the maximum over everything searched. The table is the pooled score of 1,100 simulated records in which nothing is
 //! missing, 635 of white and short noise at activity and 465 with slow noise of up to 30 ng and 5 min to 3 h beside it
-//! (`oare challenge --cases 1100 --seed 200000 --kinds clean,slow`). The last two shares stand for five and two of them. Beyond, the tail falls as
+//! (`oare challenge --cases 1100 --seed 200000 --kinds clean,slow`). The last two shares stand for five and two of them. The middle of the
+//! table differs from record to record, slow noise scores higher; it is made for its tail. Beyond, the tail falls as
 //! exp(-T), the bound of Ville for evidence ratios. Where the probability itself matters, ask for the bootstrap.
 
 /// Statistic, and the share of records of noise alone that reach it.
