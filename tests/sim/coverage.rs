@@ -104,13 +104,18 @@ fn pooled(name: &str, first_seed: u64, seeds: u64, config: impl Fn(u64) -> Missi
 
 /// 93 to 97 % of windows, up to two standard errors of the pooled share itself.
 fn hold(tallies: &[Tally]) {
-    let holds = |name: &str, [mean, error]: [f64; 2]| {
-        assert!((mean - 0.95).abs() <= 0.02 + 2.0 * error.max(0.005), "{name}: {mean:.3} +- {error:.3}");
+    let holds = |name: &str, [mean, error]: [f64; 2], error_min: f64| {
+        let allowed = 0.02 + 2.0 * error.max(error_min);
+        assert!((mean - 0.95).abs() <= allowed, "{name}: {mean:.3} +- {error:.3}, allowed {allowed:.3}");
     };
+    // Of few missions all may be inside, and their spread then says nothing of the share's error: it is that of so many independent
+    // trials a mission. Three scale factors; of the bias law, whose error is one curve, about four figures.
+    let least = |trials: f64| (0.95 * 0.05 / (trials * tallies.len() as f64)).sqrt();
+    let (of_bias, of_scale) = (least(4.0), least(3.0));
     for i in 0..3 {
-        holds("bias", mean(tallies.iter().map(|t| t.bias[i])));
-        holds("acceleration", mean(tallies.iter().map(|t| t.acceleration[i])));
-        holds("scale", mean(tallies.iter().map(|t| t.scale[i])));
+        holds("bias", mean(tallies.iter().map(|t| t.bias[i])), of_bias);
+        holds("acceleration", mean(tallies.iter().map(|t| t.acceleration[i])), 0.005);
+        holds("scale", mean(tallies.iter().map(|t| t.scale[i])), of_scale);
     }
 }
 
