@@ -2,7 +2,6 @@
 //!
 //! `cargo bench --bench calibration`; SciPy's figure needs `pip install -r benches/peers/requirements.txt`.
 
-use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::io::Write;
 use std::process::{Command, Stdio};
@@ -11,7 +10,7 @@ use std::time::{Duration, Instant};
 use oare_ground::pipeline::archive::Archive;
 use oare_ground::pipeline::calibration::bias_law::{Expectation, Point, fit};
 use oare_ground::pipeline::calibration::{self, Derived};
-use oare_ground::pipeline::window::{Window, windows};
+use oare_ground::pipeline::window::{Windows, windows};
 use oare_ground::pipeline::{Product, Settings, derive};
 use oare_ground::simulate::{Mission, MissionConfig};
 use oare_ground::telemetry::{Axis, Range};
@@ -23,7 +22,7 @@ const ROUNDS: usize = 9;
 
 struct Flown {
     archive: Archive,
-    windows: BTreeMap<i64, Window>,
+    windows: Windows,
 }
 
 impl Flown {
@@ -31,7 +30,7 @@ impl Flown {
         let held = &mut self.windows;
         windows(&self.archive, cells, &settings.window, |cell, window| {
             if let Some(window) = window {
-                held.insert(cell, window);
+                held.insert(cell, Box::new(window));
             }
         });
     }
@@ -53,7 +52,7 @@ fn median(mut times: Vec<Duration>) -> Duration {
 /// Everything but the last calibration is known; it comes, and every product is derived again.
 fn rederive(settings: &Settings) -> Derived {
     let mission = Mission::new(MissionConfig::sts65(1, HOURS)).unwrap_or_else(|problems| panic!("{problems:?}"));
-    let mut flown = Flown { archive: Archive::default(), windows: BTreeMap::new() };
+    let mut flown = Flown { archive: Archive::default(), windows: Windows::new() };
     let last_s = {
         let flight = mission.fly();
         let segments = &flight.schedule().segments;

@@ -29,6 +29,10 @@ use diagnosing::{Diagnosing, Gate};
 
 /// HTTP requests under way have this long to end after the drain.
 const HTTP_PATIENCE: Duration = Duration::from_secs(5);
+/// Niceness of what makes products, and of the searches of the running diagnosis: with every processor busy, those who ask are
+/// answered first, then products are made, then searched.
+const PRODUCTS_GIVE_WAY: i32 = 5;
+const SEARCHES_GIVE_WAY: i32 = 10;
 
 /// Why the service did not start, or ended otherwise than it was asked to.
 #[derive(Debug, thiserror::Error)]
@@ -147,14 +151,14 @@ impl Service {
         let (parts_in, parts_out) = mpsc::channel(QUEUED_READS_MAX);
         let writing = {
             let (runtime, give_up) = (tokio::runtime::Handle::current(), give_up.clone());
-            tokio::task::spawn_blocking(move || writer.run(&runtime, parts_out, &give_up))
+            in_background(PRODUCTS_GIVE_WAY, move || writer.run(&runtime, parts_out, &give_up))
         };
         let diagnosing = expected.zip(config.diagnosis.as_ref()).map(|(expected, diagnosis)| {
             let stop = CancellationToken::new();
             let (station, hub, policy) = (station.clone(), hub.clone(), diagnosis.policy.clone());
             let work = Diagnosing { station, hub, desk, expected, policy, gate, stop: stop.clone() };
             let runtime = tokio::runtime::Handle::current();
-            (stop.drop_guard(), tokio::task::spawn_blocking(move || work.run(&runtime)))
+            (stop.drop_guard(), in_background(SEARCHES_GIVE_WAY, move || work.run(&runtime)))
         });
         let rules = Rules {
             link: settings.link,
@@ -255,8 +259,27 @@ fn start_recording(
     let recorder =
         recorder::Recorder::start(&config.data_dir, &config.settings, log.clone(), hub.clone(), board.clone())?;
     let (runtime, finished) = (tokio::runtime::Handle::current(), finish.clone());
-    Ok((finish, tokio::task::spawn_blocking(move || recorder.run(&runtime, &finished))))
+    Ok((finish, in_background(PRODUCTS_GIVE_WAY, move || recorder.run(&runtime, &finished))))
 }
+
+/// A thread for work that lasts as long as the service and gives way, by so many steps of niceness, to those who answer.
+fn in_background<T: Send + 'static>(steps: i32, work: impl FnOnce() -> T + Send + 'static) -> JoinHandle<T> {
+    tokio::task::spawn_blocking(move || {
+        give_way(steps);
+        work()
+    })
+}
+
+/// Lowers the priority of this thread. Where the system has no priority of single threads, all are equal.
+#[cfg(target_os = "linux")]
+fn give_way(steps: i32) {
+    if let Err(error) = rustix::process::nice(steps) {
+        tracing::debug!(%error, "a thread keeps its priority");
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn give_way(_steps: i32) {}
 
 async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, ServiceError> {
     joined(tokio::task::spawn_blocking(work).await)

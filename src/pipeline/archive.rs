@@ -4,8 +4,8 @@
 //! compares lower stays.
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry;
 
+use super::timeline::{Timed, Timeline};
 use crate::ingest::wire::Record;
 use crate::telemetry::{AccRecord, Event, Housekeeping, Mode, OnBoardEstimate, TableReport};
 use crate::units::Clock;
@@ -38,10 +38,10 @@ pub enum Addition {
 #[derive(Debug, Default)]
 pub struct Archive {
     cells: BTreeMap<i64, Vec<AccRecord>>,
-    housekeeping: BTreeMap<(Clock, u16), Housekeeping>,
-    table: BTreeMap<(Clock, u16), TableReport>,
-    events: BTreeMap<(Clock, u16), Event>,
-    estimates: BTreeMap<(Clock, u16), OnBoardEstimate>,
+    housekeeping: Timeline<Housekeeping>,
+    table: Timeline<TableReport>,
+    events: Timeline<Event>,
+    estimates: Timeline<OnBoardEstimate>,
 }
 
 impl Archive {
@@ -49,10 +49,10 @@ impl Archive {
     pub fn add(&mut self, record: Record, sequence: u16) -> Addition {
         match record {
             Record::Acc(acc) => self.add_acc(acc),
-            Record::Hsk(report) => add_to(&mut self.housekeeping, (report.clock, sequence), report),
-            Record::Tbl(report) => add_to(&mut self.table, (report.clock, sequence), report),
-            Record::Evt(event) => add_to(&mut self.events, (event.clock, sequence), event),
-            Record::Prc(estimate) => add_to(&mut self.estimates, (estimate.clock, sequence), estimate),
+            Record::Hsk(report) => self.housekeeping.add(sequence, report),
+            Record::Tbl(report) => self.table.add(sequence, report),
+            Record::Evt(event) => self.events.add(sequence, event),
+            Record::Prc(estimate) => self.estimates.add(sequence, estimate),
         }
     }
 
@@ -105,22 +105,22 @@ impl Archive {
 
     /// Housekeeping, in order.
     pub fn housekeeping(&self) -> impl Iterator<Item = &Housekeeping> {
-        self.housekeeping.values()
+        self.housekeeping.iter()
     }
 
     /// Table reports, in order.
     pub fn table(&self) -> impl Iterator<Item = &TableReport> {
-        self.table.values()
+        self.table.iter()
     }
 
     /// Events, in order.
     pub fn events(&self) -> impl Iterator<Item = &Event> {
-        self.events.values()
+        self.events.iter()
     }
 
     /// On-board estimates, in order.
     pub fn estimates(&self) -> impl Iterator<Item = &OnBoardEstimate> {
-        self.estimates.values()
+        self.estimates.iter()
     }
 
     /// Instrument clock of the first and behind the last science record.
@@ -143,25 +143,26 @@ fn precedence(acc: &AccRecord) -> (u16, i64, [[i16; 3]; 10], [usize; 3], u8, u8)
     )
 }
 
-/// Adds what is identified by time and sequence; of two that differ the one whose debug form is lower stays, which is
-/// arbitrary but the same in every order.
-fn add_to<T: PartialEq + std::fmt::Debug>(
-    map: &mut BTreeMap<(Clock, u16), T>,
-    key: (Clock, u16),
-    value: T,
-) -> Addition {
-    match map.entry(key) {
-        Entry::Vacant(place) => {
-            place.insert(value);
-            Addition::New
-        }
-        Entry::Occupied(place) if *place.get() == value => Addition::Repeat,
-        Entry::Occupied(mut place) => {
-            let replaced = format!("{value:?}") < format!("{:?}", place.get());
-            if replaced {
-                place.insert(value);
-            }
-            Addition::Conflict { replaced }
-        }
+impl Timed for Housekeeping {
+    fn clock(&self) -> Clock {
+        self.clock
+    }
+}
+
+impl Timed for TableReport {
+    fn clock(&self) -> Clock {
+        self.clock
+    }
+}
+
+impl Timed for Event {
+    fn clock(&self) -> Clock {
+        self.clock
+    }
+}
+
+impl Timed for OnBoardEstimate {
+    fn clock(&self) -> Clock {
+        self.clock
     }
 }

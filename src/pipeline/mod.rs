@@ -15,6 +15,7 @@ pub mod product;
 pub mod report;
 pub mod settings;
 pub mod station;
+pub mod timeline;
 pub mod window;
 
 pub use ledger::{Ledger, PlaybackId};

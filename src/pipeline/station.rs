@@ -10,7 +10,7 @@ use super::frames::{FrameDigest, FrameSet, Novelty};
 use super::ledger::{Ledger, PlaybackId};
 use super::product::{Product, Revision};
 use super::settings::Settings;
-use super::window::{Window, windows};
+use super::window::{Window, Windows, windows};
 use crate::ingest::wire::packet::apid;
 use crate::ingest::wire::{
     Apid, Arrival, Assembled, Assembler, FrameId, PacketRefusal, Record, SpacePacket, TransferFrame, Verdict,
@@ -67,7 +67,7 @@ pub struct Station {
     archive: Archive,
     ledger: Ledger,
     derived: Derived,
-    windows: BTreeMap<i64, Window>,
+    windows: Windows,
     /// Shared with those who are told of them.
     products: BTreeMap<i64, Arc<Product>>,
     /// Cells with new samples.
@@ -109,7 +109,7 @@ impl Station {
             archive: Archive::default(),
             ledger: Ledger::default(),
             derived: Derived::default(),
-            windows: BTreeMap::new(),
+            windows: Windows::new(),
             products: BTreeMap::new(),
             touched: BTreeSet::new(),
             calibration_touched: true,
@@ -327,7 +327,7 @@ impl Station {
         let held = &mut self.windows;
         windows(&self.archive, starts.iter().copied(), &self.settings.window, |cell, window| {
             match window {
-                Some(window) => held.insert(cell, window),
+                Some(window) => held.insert(cell, Box::new(window)),
                 None => held.remove(&cell),
             };
         });
@@ -436,7 +436,7 @@ impl Station {
 
     /// The uncalibrated windows, in order.
     pub fn windows(&self) -> impl Iterator<Item = &Window> {
-        self.windows.values()
+        self.windows.values().map(Box::as_ref)
     }
 
     /// The product of a window by the calibration that was known at an instrument clock.

@@ -3,6 +3,8 @@
 //! Two sorted halves of 25 s make a window, so that each half is sorted once. Samples at the rail, and samples taken
 //! while the table was not in its normal position, enter no estimate.
 
+use std::collections::BTreeMap;
+
 use rapidhash::v3::rapidhash_v3;
 
 use super::archive::{Archive, CELL_TENTHS};
@@ -124,6 +126,9 @@ pub struct Window {
     /// Hash of every record in it.
     pub hash: u64,
 }
+
+/// Windows by the number of their first cell. Boxed, because the nodes of a tree that grows at its end stay half empty.
+pub type Windows = BTreeMap<i64, Box<Window>>;
 
 impl Window {
     /// Middle of the window, s.

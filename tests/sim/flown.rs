@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use oare_ground::pipeline::archive::Archive;
 use oare_ground::pipeline::calibration::{self, Derived};
-use oare_ground::pipeline::window::{Window, windows};
+use oare_ground::pipeline::window::{Windows, windows};
 use oare_ground::pipeline::{Product, Settings, derive};
 use oare_ground::simulate::truth::{TrueWindow, TruthBuilder};
 use oare_ground::simulate::{Mission, MissionConfig};
@@ -12,7 +12,7 @@ use oare_ground::simulate::{Mission, MissionConfig};
 /// A mission's windows, what is derived from them, and the truth.
 pub struct Flown {
     /// Windows.
-    pub windows: BTreeMap<i64, Window>,
+    pub windows: Windows,
     /// What was derived.
     pub derived: Derived,
     /// True windows, by the clock of their start, s.
@@ -48,13 +48,13 @@ pub fn fly(config: MissionConfig) -> Flown {
 }
 
 /// Windows of an archive, and what is derived from them.
-pub fn derive_all(archive: &Archive) -> (BTreeMap<i64, Window>, Derived) {
+pub fn derive_all(archive: &Archive) -> (Windows, Derived) {
     let settings = Settings::sts65();
-    let mut held = BTreeMap::new();
+    let mut held = Windows::new();
     let cells: Vec<i64> = archive.cells().collect();
     windows(archive, cells, &settings.window, |cell, window| {
         if let Some(window) = window {
-            held.insert(cell, window);
+            held.insert(cell, Box::new(window));
         }
     });
     let derived = calibration::derive(archive, &held, &settings, None, None);

@@ -4,12 +4,10 @@
 //! it was taken in: the scatter must be that of the mission, the level within a few micro-g of the bias of the range. Both are
 //! weighed for the range reported against every other, window by window for the span, second by second for its ends.
 
-use std::collections::BTreeMap;
-
 use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 use super::apply::Calibration;
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
-use crate::pipeline::window::Window;
+use crate::pipeline::window::{Window, Windows};
 use crate::telemetry::{AccRecord, Axis, Mode, Range};
 use crate::units::Clock;
 
@@ -71,15 +69,15 @@ impl Usual<'_> {
 }
 
 fn usual_scatter_ng<'w>(
-    windows: impl Iterator<Item = (&'w i64, &'w Window)> + Clone,
+    windows: impl Iterator<Item = &'w Window> + Clone,
     resolution_ng: &[[f64; 3]; 3],
 ) -> Option<[f64; 3]> {
     let mut usual = [0.0; 3];
     for axis in 0..3 {
         let mut all: Vec<f64> = windows
             .clone()
-            .filter(|(_, w)| w.mode == Mode::Normal)
-            .filter_map(|(_, w)| w.axes[axis].map(|a| a.estimate.winsorised_sd * resolution_ng[axis][a.range.index()]))
+            .filter(|w| w.mode == Mode::Normal)
+            .filter_map(|w| w.axes[axis].map(|a| a.estimate.winsorised_sd * resolution_ng[axis][a.range.index()]))
             .collect();
         // The middle is enough; the mean of the two inner ones would cost a whole sort.
         let middle = all.len().checked_sub(1)? / 2;
@@ -134,12 +132,14 @@ struct Span {
 /// Finds the spans, their corrections and what to tell, from what was known at an instrument clock.
 pub fn find(
     archive: &Archive,
-    windows: &BTreeMap<i64, Window>,
+    windows: &Windows,
     calibration: &Calibration,
     known_at: Clock,
 ) -> Vec<(Anomaly, Vec<RangeCorrection>)> {
     let known = || windows.iter().filter(|(_, window)| window.known_since <= known_at);
-    let Some(scatter_ng) = usual_scatter_ng(known(), &calibration.resolution_ng) else { return Vec::new() };
+    let Some(scatter_ng) = usual_scatter_ng(known().map(|(_, window)| &**window), &calibration.resolution_ng) else {
+        return Vec::new();
+    };
     let usual = Usual { scatter_ng, calibration };
     let mut spans: Vec<Span> = Vec::new();
     for (cell, window) in known().filter(|(_, w)| w.mode == Mode::Normal) {
@@ -186,7 +186,7 @@ fn ln_scatter_ratio(usual: &Usual<'_>, window: &Window) -> f64 {
 fn settle_span(
     archive: &Archive,
     usual: &Usual<'_>,
-    windows: &BTreeMap<i64, Window>,
+    windows: &Windows,
     span: &Span,
     known_at: Clock,
 ) -> Option<(Anomaly, Vec<RangeCorrection>)> {

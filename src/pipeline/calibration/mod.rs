@@ -21,7 +21,7 @@ mod two_position;
 mod unsteady;
 mod version;
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 pub use anomaly::{Anomaly, AnomalyKind, RangeCorrection};
@@ -41,7 +41,7 @@ use self::unsteady::Walks;
 use self::version::{Material, version};
 use super::archive::Archive;
 use super::settings::Settings;
-use super::window::Window;
+use super::window::Windows;
 use crate::telemetry::{Axis, Range};
 use crate::units::Clock;
 
@@ -96,7 +96,7 @@ impl Derived {
 /// The spans of wrongly reported ranges as they were known at an instrument clock, by the calibration known then.
 pub fn range_corrections_as_of(
     archive: &Archive,
-    windows: &BTreeMap<i64, Window>,
+    windows: &Windows,
     derived: &Derived,
     known_at: Clock,
 ) -> Vec<RangeCorrection> {
@@ -108,7 +108,7 @@ pub fn range_corrections_as_of(
 /// work: versions whose material did not change are taken from it.
 pub fn derive(
     archive: &Archive,
-    windows: &BTreeMap<i64, Window>,
+    windows: &Windows,
     settings: &Settings,
     known: Option<&KnownCalibration>,
     previous: Option<&Derived>,
@@ -221,7 +221,7 @@ fn signature(
     hasher.finish()
 }
 
-fn find_anomalies(archive: &Archive, windows: &BTreeMap<i64, Window>, derived: &mut Derived) {
+fn find_anomalies(archive: &Archive, windows: &Windows, derived: &mut Derived) {
     let mut anomalies = Vec::new();
     if let Some(calibration) = derived.current() {
         for (anomaly, corrections) in misreport::find(archive, windows, calibration, Clock::from_tenths(i64::MAX)) {

@@ -5,9 +5,7 @@
 //! periods are those of the orbit; the ratio of their variance to the one expected of independent samples is the factor
 //! squared. Differences over 300 s hold the slope of the signal, which a two-position measurement takes for bias.
 
-use std::collections::BTreeMap;
-
-use crate::pipeline::window::Window;
+use crate::pipeline::window::{Window, Windows};
 use crate::telemetry::Quality;
 use crate::units::Clock;
 
@@ -62,14 +60,14 @@ struct Sums {
 
 impl NoiseHistory {
     /// Sums over all whole windows of normal mode.
-    pub fn new(windows: &BTreeMap<i64, Window>, resolution_ng: &[[f64; 3]; 3]) -> Self {
+    pub fn new(windows: &Windows, resolution_ng: &[[f64; 3]; 3]) -> Self {
         let mut sums = [Sums::default(); 3];
         let mut entries = Vec::new();
         // The windows of the last cells, by the cell's remainder: looking them up in the map again and again costs the most.
         let mut ring: [(i64, Option<&Window>); RING] = [(i64::MIN, None); RING];
         let place = |cell: i64| cell.rem_euclid(RING as i64) as usize;
         for (cell, window) in windows {
-            ring[place(*cell)] = (*cell, Some(window).filter(|w| w.quality == Quality::GOOD));
+            ring[place(*cell)] = (*cell, Some(&**window).filter(|w| w.quality == Quality::GOOD));
             let whole = |cell: i64| Some(ring[place(cell)]).filter(|(of, _)| *of == cell).and_then(|(_, w)| w);
             let (Some(last), Some(before)) = (whole(*cell), whole(cell - LAG_CELLS)) else { continue };
             for axis in 0..3 {

@@ -5,11 +5,9 @@
 //! that: it outlasts autoranging, or happens in range A, or comes faster than the 1 Hz filter lets an overload rise. While the
 //! table turns, its own acceleration may hold an axis at the rail: then only the last of these counts.
 
-use std::collections::BTreeMap;
-
 use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 use crate::pipeline::archive::Archive;
-use crate::pipeline::window::Window;
+use crate::pipeline::window::Windows;
 use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, Step};
 use crate::units::Clock;
 
@@ -23,6 +21,9 @@ const STEP_COUNTS: i32 = 16_384;
 const APART_TENTHS: i64 = 50;
 /// Y at the rail for this long in reentry mode is the shutdown, s.
 const SHUTDOWN_S: f64 = 60.0;
+
+/// A window may hold a run when it says so, or when it has samples that it did not look at.
+const LOOKED_AT: Quality = Quality::SATURATED.with_if(Quality::TABLE_MOVING, true);
 
 /// One axis at the rail.
 #[derive(Debug, Clone, Copy)]
@@ -38,10 +39,10 @@ struct Run {
 }
 
 /// The saturations, in order of time.
-pub fn find(archive: &Archive, windows: &BTreeMap<i64, Window>, corrections: &[RangeCorrection]) -> Vec<Anomaly> {
+pub fn find(archive: &Archive, windows: &Windows, corrections: &[RangeCorrection]) -> Vec<Anomaly> {
     let mut cells: Vec<i64> = windows
         .iter()
-        .filter(|(_, w)| w.quality.contains(Quality::SATURATED) || w.mode == Mode::Reentry)
+        .filter(|(_, window)| window.quality.intersects(LOOKED_AT) || window.mode == Mode::Reentry)
         .flat_map(|(cell, _)| [*cell, *cell + 1])
         .collect();
     cells.sort_unstable();

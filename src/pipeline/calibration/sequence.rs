@@ -1,11 +1,11 @@
 //! The steps of the calibration sequences, cut out of the records: runs of seconds in one mode, target, step and range.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use crate::math::robust::{TrimLaw, TrimmedMean, spread_counts, trimmed_mean_of_values};
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
-use crate::pipeline::window::Window;
+use crate::pipeline::window::Windows;
 use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, Step};
 use crate::units::Clock;
 
@@ -128,7 +128,7 @@ impl Hold<'_> {
 /// digest and saves their making.
 pub fn holds<'a>(
     archive: &'a Archive,
-    windows: &BTreeMap<i64, Window>,
+    windows: &Windows,
     law: &TrimLaw,
     kept: Option<&HashMap<u64, Means>>,
 ) -> Vec<Hold<'a>> {

@@ -6,7 +6,7 @@
 //! and range, a straight line for the signal, and a random walk; the walk's rate is the one of largest likelihood, and counts
 //! only where that likelihood is beyond what chance gives.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use nalgebra::{DMatrix, DVector};
@@ -16,7 +16,7 @@ use super::sequence::Hold;
 use super::two_position::Pair;
 use crate::math::robust::{rounding_error_spread, rounding_error_trimmed};
 use crate::pipeline::settings::Settings;
-use crate::pipeline::window::Window;
+use crate::pipeline::window::Windows;
 use crate::telemetry::{Axis, Mode, Quality, Range, Step};
 
 /// Pairs of one calibration lie this close, s: it takes 900.
@@ -71,7 +71,7 @@ struct Reading {
 pub(super) fn excess(
     holds: &[Hold<'_>],
     pairs: &[Pair<'_, '_>],
-    windows: &BTreeMap<i64, Window>,
+    windows: &Windows,
     settings: &Settings,
     walks: (&mut Walks, Option<&Walks>),
 ) -> Vec<[f64; 3]> {
@@ -108,7 +108,7 @@ fn as_one(variances_ng2: [f64; 3]) -> f64 {
 pub(super) fn of_scales(
     holds: &[Hold<'_>],
     sequences: &mut [ScaleSequence],
-    windows: &BTreeMap<i64, Window>,
+    windows: &Windows,
     settings: &Settings,
     walks: (&mut Walks, Option<&Walks>),
 ) {
@@ -208,7 +208,7 @@ fn range_of_scatter(scatter_counts: f64, axis: Axis, levels_ng: f64, settings: &
 fn window_readings(
     [start_s, end_s]: [f64; 2],
     levels: &[&Hold<'_>],
-    windows: &BTreeMap<i64, Window>,
+    windows: &Windows,
     axis: Axis,
     settings: &Settings,
 ) -> Vec<Reading> {
