@@ -11,6 +11,8 @@ use super::error::CaseError;
 pub const WINDOWS_MIN: usize = 200;
 /// Half of the window the recorder averages over, s.
 pub const HALF_WINDOW_S: f64 = 25.0;
+/// From the centre of one window to that of the next, s.
+pub const WINDOW_STRIDE_S: f64 = 25.0;
 
 /// `case.toml`, checked. What other kinds add stays in `table`.
 #[derive(Debug, Clone)]

@@ -6,12 +6,13 @@ use super::answer::{
 use super::catalogue::{self, Effect, WHOLE};
 use super::design::{Chosen, Column, Frame};
 use super::locate;
-use super::model::{self, MemberFit, rms};
+use super::model::{self, MemberFit};
 use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{self, Entry, Family, Set, Weighed};
 use super::separating;
 use super::solve::{Library, Solution};
+use crate::math::rms::rms_about_mean;
 
 /// Log odds by which an open form must beat the best listed set.
 const OPEN_MARGIN: f64 = 3.0;
@@ -345,7 +346,7 @@ fn effects(library: &Library, best: &Best, posterior: impl Fn(usize) -> f64) -> 
                 .collect(),
             axis: best.fits[i].axis.clone(),
             why: effect.why.into(),
-            rms_ng: Some(std::array::from_fn(|k| rms(&best.contributions[i][k]))),
+            rms_ng: Some(std::array::from_fn(|k| rms_about_mean(&best.contributions[i][k]))),
         });
     }
     out.sort_by(|a, b| b.posterior.total_cmp(&a.posterior));
@@ -429,7 +430,7 @@ fn fit(
     let after = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &left);
     let dof = 3.0 * (scene.schedule.len() as f64 - 1.0);
     let level = |axes: &Axes, f: &Frame, used: f64| FitLevel {
-        rms_ng: std::array::from_fn(|k| rms(&axes[k])),
+        rms_ng: std::array::from_fn(|k| rms_about_mean(&axes[k])),
         whitened_chi2_per_dof: f.data.dot(&f.data) / (dof - used),
     };
     let used: f64 = set.members.iter().map(|m| m.linear() as f64).sum();
@@ -493,7 +494,7 @@ fn upper_limits(scene: &Scene, library: &Library, frame: &Frame, set: &Set) -> V
             let raws = shape.columns();
             let scales: Vec<f64> = raws
                 .iter()
-                .map(|raw| (raw.iter().flatten().map(|s| rms(s).powi(2)).sum::<f64>()).sqrt().max(1e-30))
+                .map(|raw| (raw.iter().flatten().map(|s| rms_about_mean(s).powi(2)).sum::<f64>()).sqrt().max(1e-30))
                 .collect();
             let columns: Vec<Column> = raws.iter().zip(&scales).map(|(raw, s)| frame.column(raw, 300.0 / s)).collect();
             let (value, sigma) = conditional(&chosen, &columns);
