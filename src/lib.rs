@@ -19,6 +19,7 @@
 //! |---|---|---|
 //! | [`units`] | clock, mission time, constants: SI inside, conversions at the borders | yes |
 //! | [`math`] | robust means, least squares, rotation, spectra: slices and matrices only | yes |
+//! | [`paper`] | what every report shares: page, tables, figures | yes |
 //! | [`telemetry`] | the nouns: records, axes, ranges, quality | yes |
 //! | [`ingest::wire`] | bytes to frames, packets and records, and back | yes |
 //! | [`physics`] | orbit, attitude, atmosphere, Sun, geomagnetic and gravity field; one force term a file | yes |
@@ -48,6 +49,7 @@ pub mod diagnose;
 pub mod hub;
 pub mod ingest;
 pub mod math;
+pub mod paper;
 pub mod physics;
 pub mod pipeline;
 pub mod record;

@@ -11,6 +11,7 @@ use oare_ground::diagnose::measured::{self, Kind, Plates};
 use rayon::prelude::*;
 
 use super::challenge::bar;
+use super::output;
 
 /// Draw, analyse, reveal, score, and say how long it took; with `out`, diagnose the cases whole and write the evidence.
 pub fn run(dir: &Path, draws: usize, seed: u64, out: Option<&Path>) -> anyhow::Result<ExitCode> {
@@ -82,12 +83,8 @@ fn write(out: &Path, folders: &[PathBuf], draws: Vec<Outcome>, score: Score) -> 
     let (cases, plates): (Vec<Whole>, Vec<Plates>) = wholes.into_iter().unzip();
     progress.finish_and_clear();
     let evidence = Evidence { limits: LIMITS, score, draws, cases };
-    let file = |name: &str, text: String| {
-        let path = out.join(name);
-        std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
-    };
-    file("evidence.json", serde_json::to_string_pretty(&evidence)?)?;
-    file("evidence.html", evidence.html(&plates))?;
+    output::write(&out.join("evidence.json"), &serde_json::to_string_pretty(&evidence)?)?;
+    output::write(&out.join("evidence.html"), &evidence.html(&plates))?;
     eprintln!("evidence in {}", out.display());
     Ok(())
 }

@@ -6,12 +6,14 @@ use std::process::ExitCode;
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use oare_ground::diagnose::analysis::{Analysis, Prepared, Settings};
-use oare_ground::diagnose::answer::{Diagnosis, Verdict};
+use oare_ground::diagnose::answer::Diagnosis;
 use oare_ground::diagnose::case::{Case, Header, Texts};
 use oare_ground::diagnose::error::CaseError;
 use oare_ground::diagnose::measured::{self, MeasuredCase};
 use oare_ground::diagnose::{recorder, report};
 use rayon::prelude::*;
+
+use super::output::{write, write_report};
 
 /// Says what physics a simulation left out, from a case directory.
 #[derive(clap::Args)]
@@ -59,22 +61,16 @@ fn measured(args: &Args) -> anyhow::Result<ExitCode> {
         write(out, &json)?;
     }
     if let Some(directory) = &args.report {
-        let drawn = measured::page::report(&answer, &plates);
-        write(&directory.join("index.html"), &drawn.html)?;
-        write(&directory.join("diagnosis.json"), &json)?;
-        for (name, svg) in &drawn.figures {
-            write(&directory.join(name), svg)?;
-        }
+        write_report(directory, &measured::page::report(&answer, &plates), ("diagnosis.json", &json))?;
     }
     if args.json {
         println!("{json}");
         return Ok(super::DONE);
     }
-    let verdict = serde_json::to_value(answer.verdict)?;
     println!(
         "{}: {} (false-alarm probability {:.1e})",
         answer.case,
-        verdict.as_str().unwrap_or_default(),
+        answer.verdict.word(),
         answer.false_alarm_probability
     );
     println!("  {}", measured::page::sentence(&answer));
@@ -108,12 +104,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         write(out, &json)?;
     }
     if let Some(directory) = &args.report {
-        let drawn = report::report(&analysis.diagnosis, &analysis.plates);
-        write(&directory.join("index.html"), &drawn.html)?;
-        write(&directory.join("diagnosis.json"), &json)?;
-        for (name, svg) in &drawn.figures {
-            write(&directory.join(name), svg)?;
-        }
+        let report = report::report(&analysis.diagnosis, &analysis.plates);
+        write_report(directory, &report, ("diagnosis.json", &json))?;
     }
     if args.json {
         println!("{json}");
@@ -175,20 +167,8 @@ pub fn read_case(directory: &Path, set: &[String]) -> Result<Case, CaseError> {
     Case::from_texts(header, &texts)
 }
 
-fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
-        std::fs::create_dir_all(parent).with_context(|| format!("cannot make {}", parent.display()))?;
-    }
-    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
-}
-
 fn print_table(diagnosis: &Diagnosis) {
-    let verdict = match diagnosis.verdict {
-        Verdict::Consistent => "consistent",
-        Verdict::Explained => "explained",
-        Verdict::Ambiguous => "ambiguous",
-        Verdict::Unexplained => "unexplained",
-    };
+    let verdict = diagnosis.verdict.word();
     println!("{}: {verdict} (false-alarm probability {:.1e})", diagnosis.case, diagnosis.false_alarm_probability);
     for effect in &diagnosis.effects {
         println!("  {:<28} posterior {:.3}", effect.id, effect.posterior);

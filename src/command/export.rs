@@ -8,8 +8,8 @@ use std::process::ExitCode;
 use anyhow::{Context, Result};
 use clap::ValueEnum;
 use oare_ground::hub::{Body, Message};
+use oare_ground::ingest::log_replay::rebuild;
 use oare_ground::ingest::raw_log::RawLog;
-use oare_ground::ingest::writer::rebuild;
 use oare_ground::pipeline::{Station, files};
 use oare_ground::record::{mcap_file::Recording, table};
 use oare_ground::units::{Clock, MissionTime};
@@ -94,11 +94,7 @@ fn write_tables(station: &Station, out: &std::path::Path, from: Clock, to: Clock
         ("anomalies.json", json(files::anomalies_json(station))?),
         ("ledger.json", json(files::ledger_json(station))?),
     ];
-    for (name, text) in files {
-        let path = out.join(name);
-        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
-    }
-    Ok(())
+    files.iter().try_for_each(|(name, text)| super::output::write(&out.join(name), text))
 }
 
 fn write_recording(log: &RawLog, station: &Station, out: &std::path::Path, from: Clock, to: Clock) -> Result<()> {

@@ -5,6 +5,7 @@ mod challenge_real;
 pub mod demo;
 pub mod diagnose;
 pub mod export;
+mod output;
 pub mod pad;
 pub mod process;
 pub mod replay;

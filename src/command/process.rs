@@ -17,6 +17,8 @@ use oare_ground::pipeline::{PlaybackId, Station, files};
 use oare_ground::record::{mcap_file::Recording, mcap_reader};
 use sha2::{Digest, Sha256};
 
+use super::output::{write, write_report};
+
 /// Arguments of `oare process`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -73,7 +75,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
     write_products(&station, &args.out)?;
     write_recording(&station, &streams, &args.out.join("recording.mcap"))?;
     if let Some(folder) = &args.report {
-        write_report(&station, folder)?;
+        let report = report(&station);
+        write_report(folder, &report.paper, ("accuracy.json", &pretty(&report.accuracy)?))?;
     }
     summarise(&station, args.json)
 }
@@ -148,28 +151,14 @@ fn write_recording(station: &Station, streams: &[Stream], path: &Path) -> Result
 }
 
 fn write_products(station: &Station, out: &Path) -> Result<()> {
-    fs::create_dir_all(out).with_context(|| format!("cannot make {}", out.display()))?;
-    let write = |name: &str, text: String| {
-        let path = out.join(name);
-        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
-    };
-    let pretty = |value: &serde_json::Value| -> Result<String> { Ok(serde_json::to_string_pretty(value)? + "\n") };
-    write("windows.csv", files::windows_csv(station))?;
-    write("calibration.json", pretty(&files::calibration_json(station))?)?;
-    write("anomalies.json", pretty(&files::anomalies_json(station))?)?;
-    write("ledger.json", pretty(&files::ledger_json(station))?)
+    write(&out.join("windows.csv"), &files::windows_csv(station))?;
+    write(&out.join("calibration.json"), &pretty(&files::calibration_json(station))?)?;
+    write(&out.join("anomalies.json"), &pretty(&files::anomalies_json(station))?)?;
+    write(&out.join("ledger.json"), &pretty(&files::ledger_json(station))?)
 }
 
-fn write_report(station: &Station, folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-    let write = |name: &str, text: &str| {
-        let path = folder.join(name);
-        fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
-    };
-    let report = report(station);
-    write("index.html", &report.html)?;
-    write("accuracy.json", &(serde_json::to_string_pretty(&report.accuracy)? + "\n"))?;
-    report.figures.iter().try_for_each(|(name, svg)| write(name, svg))
+fn pretty(value: &serde_json::Value) -> Result<String> {
+    Ok(serde_json::to_string_pretty(value)? + "\n")
 }
 
 /// Tells what was taken in, and what could not be used.

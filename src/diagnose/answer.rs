@@ -73,6 +73,18 @@ pub enum Verdict {
     Unexplained,
 }
 
+impl Verdict {
+    /// The word that stands for it in every answer.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Consistent => "consistent",
+            Self::Explained => "explained",
+            Self::Ambiguous => "ambiguous",
+            Self::Unexplained => "unexplained",
+        }
+    }
+}
+
 /// Where the mismatch is.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Located {

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::answer::{Diagnosis, Verdict};
-use super::case::{Case, Expectation, WINDOWS_MIN};
+use super::case::{Case, Expectation, WINDOW_STRIDE_S, WINDOWS_MIN};
 use super::error::CaseError;
 use super::noise::AxisNoise;
 use super::recorder::Usable;
@@ -24,8 +24,6 @@ use super::{null_table, verdict};
 
 /// Looks kept for readers.
 const LOOKS_MAX: usize = 100;
-/// Recording seconds a new window adds.
-const STRIDE_S: f64 = 25.0;
 /// What times are counted from.
 const ONSET: &str = "onset";
 const FIRST_DATA: &str = "first_data";
@@ -200,7 +198,7 @@ impl Live {
         if seen.windows < WINDOWS_MIN || seen.digest == self.seen.digest {
             return false;
         }
-        let fresh_s = seen.windows.saturating_sub(self.seen.windows) as f64 * STRIDE_S;
+        let fresh_s = seen.windows.saturating_sub(self.seen.windows) as f64 * WINDOW_STRIDE_S;
         self.seen.windows == 0
             || !is_coming
             || fresh_s >= self.policy.search_every_s

@@ -9,6 +9,7 @@ use super::design::{Chosen, Column, Frame};
 use super::noise::{AxisNoise, Schedule};
 use super::scene::{Axes, Scene};
 use super::search::{self, Entry, Family, Set};
+use crate::math::rms::rms_about_mean;
 
 /// Length of the blocks that are held out in turn, s.
 pub const BLOCK_S: f64 = 21_600.0;
@@ -217,13 +218,6 @@ fn member_series(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, mov
     Some(sum)
 }
 
-/// RMS with the mean removed.
-pub fn rms(series: &[f64]) -> f64 {
-    let n = series.len().max(1) as f64;
-    let mean = series.iter().sum::<f64>() / n;
-    (series.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt()
-}
-
 /// One half of the record, as a case of its own.
 struct Half {
     index: Vec<usize>,
@@ -282,8 +276,8 @@ pub fn held_out(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, nois
     let spread = block_gain.iter().map(|g| (g - gain / count).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
     HeldOut {
         scheme: "alternate 6 h blocks".into(),
-        before_rms_ng: std::array::from_fn(|k| rms(&scene.residual_ng[k])),
-        after_rms_ng: std::array::from_fn(|k| rms(&after[k])),
+        before_rms_ng: std::array::from_fn(|k| rms_about_mean(&scene.residual_ng[k])),
+        after_rms_ng: std::array::from_fn(|k| rms_about_mean(&after[k])),
         excess_removed: if signal_energy > 0.0 { 1.0 - missed_energy / signal_energy } else { 0.0 },
         log_score_gain: gain,
         log_score_gain_se: (spread * count).sqrt(),

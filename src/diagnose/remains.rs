@@ -10,10 +10,9 @@ use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::case::WINDOW_STRIDE_S;
 use super::scene::Axes;
 
-/// Spacing of the windows' grid, s.
-const STRIDE_S: f64 = 25.0;
 /// Shortest period at which the axes are compared, s: what is faster is the crew's.
 const TOGETHER_S: f64 = 400.0;
 /// Shortest period of a line that is looked for, s, and the fewest cycles in the record.
@@ -65,7 +64,7 @@ struct Grid {
 impl Grid {
     fn new(clock_s: &[f64], whitened: &Axes) -> Option<Self> {
         let (first, last) = (*clock_s.first()?, *clock_s.last()?);
-        let place = |t: &f64| ((t - first) / STRIDE_S).round() as usize;
+        let place = |t: &f64| ((t - first) / WINDOW_STRIDE_S).round() as usize;
         let record = place(&last) as f64;
         let length = (place(&last) + 1).next_power_of_two();
         // A record of a few minutes has no bands; one of years is not of this kind.
@@ -96,7 +95,7 @@ impl Grid {
     }
 
     fn span_s(&self) -> f64 {
-        self.length() as f64 * STRIDE_S
+        self.length() as f64 * WINDOW_STRIDE_S
     }
 
     /// Spectra of the series, their phase turned back by that of a line that drifts by so many cycles; unit mean square.
@@ -175,7 +174,7 @@ fn line(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
         let cycles = f64::from(step) * DRIFT_STEP;
         let spectra = grid.spectra(cycles);
         // The line keeps at least a fifth of its first frequency.
-        let least = -2.0 * cycles * grid.span_s() / (0.8 * grid.record * STRIDE_S);
+        let least = -2.0 * cycles * grid.span_s() / (0.8 * grid.record * WINDOW_STRIDE_S);
         for m in CYCLES_MIN.max(least.ceil() as usize)..=last {
             let power: [f64; 3] = std::array::from_fn(|k| 2.0 * spectra[k][m].norm_sqr());
             let sum: f64 = power.iter().sum();
@@ -188,7 +187,7 @@ fn line(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
     let trials = f64::from(2 * steps + 1) * (last + 1 - CYCLES_MIN) as f64;
     let amplitude: [f64; 3] = std::array::from_fn(|k| power[k].sqrt() * scale_ng[k]);
     let loudest = (0..3).max_by(|a, b| amplitude[*a].total_cmp(&amplitude[*b])).unwrap_or(0);
-    let period = |x: f64| (m as f64 / grid.span_s() + 2.0 * cycles * x / (grid.record * STRIDE_S)).recip();
+    let period = |x: f64| (m as f64 / grid.span_s() + 2.0 * cycles * x / (grid.record * WINDOW_STRIDE_S)).recip();
     Some(Remains {
         probability: (tail(6.0, energy) * trials).min(1.0),
         energy,
@@ -211,7 +210,7 @@ mod tests {
     }
 
     fn clock(n: usize) -> Vec<f64> {
-        (0..n).filter(|i| i % 170 > 4).map(|i| 1000.0 + STRIDE_S * i as f64).collect()
+        (0..n).filter(|i| i % 170 > 4).map(|i| 1000.0 + WINDOW_STRIDE_S * i as f64).collect()
     }
 
     #[test]

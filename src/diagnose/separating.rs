@@ -17,7 +17,7 @@ use crate::physics::{J2, Vec3, drag, gravity_gradient, rotation};
 use crate::units::NANO_G_M_S2;
 
 use super::answer::SeparatingObservation;
-use super::case::{Ancillary, Case, Expectation, Simulation};
+use super::case::{Ancillary, Case, Expectation, Simulation, WINDOW_STRIDE_S};
 use super::catalogue::{Effect, Shape, Theta};
 use super::design::{Chosen, Column, Frame, Raw};
 use super::noise::AxisNoise;
@@ -29,8 +29,6 @@ const DECISIVE: f64 = 3.0;
 const GRID_S: f64 = 30.0;
 /// A turn takes this long, and nothing is compared meanwhile, s.
 const TURN_S: f64 = 600.0;
-/// Between windows, s.
-const STRIDE_S: f64 = 25.0;
 /// What a candidate may last, h.
 const HOURS: [f64; 4] = [1.5, 3.0, 6.0, 12.0];
 /// What a turn of the vehicle costs beside the hours, in hours.
@@ -380,8 +378,8 @@ fn to_come(scene: &Scene, action: Action, hours: f64) -> Option<(Case, Surroundi
     }
     let mut recording = scene.case.recording.clone();
     let first_s = from_s + TURN_S;
-    let windows = (hours * 3600.0 / STRIDE_S) as usize;
-    recording.clock_s.extend((1..=windows).map(|n| first_s + n as f64 * STRIDE_S));
+    let windows = (hours * 3600.0 / WINDOW_STRIDE_S) as usize;
+    recording.clock_s.extend((1..=windows).map(|n| first_s + n as f64 * WINDOW_STRIDE_S));
     for k in 0..3 {
         let (a, dev) = (&mut recording.a_ng[k], &mut recording.dev_ng[k]);
         a.resize(a.len() + windows, 0.0);

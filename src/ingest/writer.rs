@@ -12,13 +12,14 @@ use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
 use super::listener::Parts;
-use super::raw_log::{Entry, Journal, JournalPart, RawLog, StoreError, Stored};
+use super::log_replay::{Orphans, set_aside, take_entry, take_log};
+use super::raw_log::{Entry, Journal, JournalPart, RawLog, StoreError};
 use crate::hub::status::{Board, Phase, Picture, count};
 use crate::hub::wire::{AnomalyWire, EventWire, Gap, members};
 use crate::hub::{Body, Hub, Journaled, SampleSource, Topic};
 use crate::ingest::wire::playback::PlaybackPart;
 use crate::pipeline::files::version_json;
-use crate::pipeline::{Change, PlaybackId, Settings, Station};
+use crate::pipeline::{Change, Station};
 use crate::telemetry::AccRecord;
 use crate::units::Clock;
 
@@ -86,10 +87,10 @@ impl Writer {
         let journal = log.journal()?;
         let messages = journal.entries.len();
         let mut batch = 0;
-        let mut orphans = Orphans { frame_octets: 0, open: HashMap::new(), next_playback: 0 };
+        let mut orphans;
         {
             let mut held = station.write().expect("no holder panics");
-            orphans.frame_octets = held.settings().link.frame_octets;
+            orphans = Orphans::new(held.settings().link.frame_octets);
             held.announce_raw(journal.batches == 0);
             take_log(&log, &mut held, |station, number, entries| {
                 entries.iter().for_each(|stored| orphans.note(stored));
@@ -377,76 +378,6 @@ impl Writer {
     }
 }
 
-/// A station over a whole log, with nobody to tell.
-///
-/// # Errors
-/// When the log cannot be read.
-pub fn rebuild(log: &RawLog, settings: &Settings) -> Result<Station, StoreError> {
-    let mut station = Station::new(settings.clone(), None);
-    take_log(log, &mut station, |_, _, _| {})?;
-    station.flush();
-    Ok(station)
-}
-
-/// A new station takes a whole log, a second time where frames lost a vote; `note` is called with every batch it took.
-fn take_log(
-    log: &RawLog,
-    station: &mut Station,
-    mut note: impl FnMut(&mut Station, u64, &[Stored]),
-) -> Result<(), StoreError> {
-    take_once(log, station, &mut note)?;
-    set_aside(log, station, note).map(|_| ())
-}
-
-/// Takes the log again where good frames of one identity differ and one in use lost the vote; whether that was so.
-fn set_aside(
-    log: &RawLog,
-    station: &mut Station,
-    mut note: impl FnMut(&mut Station, u64, &[Stored]),
-) -> Result<bool, StoreError> {
-    let Some(set_aside) = station.to_set_aside() else { return Ok(false) };
-    tracing::warn!("good frames of one identity differ; the log is taken again with the ones seen more often");
-    *station = Station::without(station.settings().clone(), None, set_aside);
-    take_once(log, station, &mut note)?;
-    Ok(true)
-}
-
-fn take_once(
-    log: &RawLog,
-    station: &mut Station,
-    note: &mut impl FnMut(&mut Station, u64, &[Stored]),
-) -> Result<(), StoreError> {
-    log.replay(|number, batch| {
-        for stored in &batch {
-            take_stored(log, station, stored)?;
-        }
-        note(station, number, &batch);
-        Ok(())
-    })
-}
-
-/// The octets of a repeat are read again only where the station cannot do without.
-fn take_stored(log: &RawLog, station: &mut Station, stored: &Stored) -> Result<(), StoreError> {
-    match stored {
-        Stored::Entry(entry, _) => take_entry(station, entry),
-        Stored::Repeat { playback, arrival, place } => {
-            let playback = PlaybackId(*playback);
-            if !station.take_repeat(playback, arrival) {
-                station.take(playback, &log.resolve(arrival.clone(), *place)?);
-            }
-        }
-    }
-    Ok(())
-}
-
-fn take_entry(station: &mut Station, entry: &Entry) {
-    match entry {
-        Entry::Opened { playback } => station.open_playback(PlaybackId(*playback)),
-        Entry::Arrival { playback, arrival } => station.take(PlaybackId(*playback), arrival),
-        Entry::Closed { playback, bits } => station.close_playback(PlaybackId(*playback), *bits),
-    }
-}
-
 /// What a change says to readers; `None` when they know.
 fn body(hub: &Hub, station: &Station, change: Change) -> Option<Body> {
     match change {
@@ -500,56 +431,5 @@ fn picture(station: &Station) -> Picture {
         events: station.events().count() as u64,
         anomalies: station.derived().anomalies.len() as u64,
         settled: station.is_settled(),
-    }
-}
-
-/// One more than the playback an entry names.
-fn next_playback(entry: &Entry) -> u32 {
-    match entry {
-        Entry::Opened { playback } | Entry::Arrival { playback, .. } | Entry::Closed { playback, .. } => playback + 1,
-    }
-}
-
-/// Playbacks that a crash left open: from which bit of their stream to which.
-struct Orphans {
-    frame_octets: usize,
-    open: HashMap<u32, (u64, u64)>,
-    next_playback: u32,
-}
-
-impl Orphans {
-    fn note(&mut self, stored: &Stored) {
-        match stored {
-            Stored::Entry(Entry::Opened { playback }, _) => {
-                self.next_playback = self.next_playback.max(playback + 1);
-                self.open.insert(*playback, (0, 0));
-            }
-            Stored::Entry(Entry::Closed { playback, .. }, _) => {
-                self.open.remove(playback);
-            }
-            Stored::Entry(Entry::Arrival { playback, arrival }, _) => {
-                self.note_arrival(*playback, arrival.first_bit, arrival.octets.len());
-            }
-            Stored::Repeat { playback, arrival, .. } => {
-                self.note_arrival(*playback, arrival.first_bit, self.frame_octets);
-            }
-        }
-    }
-
-    fn note_arrival(&mut self, playback: u32, first_bit: u64, octets: usize) {
-        let end_bit = first_bit + octets as u64 * 8;
-        let span = self.open.entry(playback).or_insert((first_bit, end_bit));
-        if *span == (0, 0) {
-            *span = (first_bit, end_bit);
-        }
-        span.1 = span.1.max(end_bit);
-    }
-
-    /// The ends of these playbacks, as far as their bits are known.
-    fn closing(self) -> Vec<Entry> {
-        let closed = |(playback, (from_bit, to_bit))| Entry::Closed { playback, bits: to_bit - from_bit };
-        let mut closing: Vec<Entry> = self.open.into_iter().map(closed).collect();
-        closing.sort_by_key(next_playback);
-        closing
     }
 }

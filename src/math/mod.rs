@@ -1,4 +1,5 @@
 //! Robust means, least squares, rotation, spectra and evidence, on slices and matrices only.
 
 pub mod ranked;
+pub mod rms;
 pub mod robust;

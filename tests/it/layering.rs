@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms in their order, and whether they are pure. A room uses only itself and rooms before it.
-const ROOMS: [(&str, bool); 17] = [
+const ROOMS: [(&str, bool); 18] = [
     ("units", true),
     ("math", true),
+    ("paper", true),
     ("telemetry", true),
     ("ingest/wire", true),
     ("physics", true),

@@ -6,9 +6,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use oare_ground::config::Config;
+use oare_ground::ingest::log_replay::rebuild;
 use oare_ground::ingest::raw_log::{Entry, RawLog, Stored};
 use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader};
-use oare_ground::ingest::writer::rebuild;
 use oare_ground::pipeline::{PlaybackId, Settings, station::replay};
 use oare_ground::record::mcap_reader;
 use oare_ground::service::Service;

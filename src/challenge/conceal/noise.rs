@@ -7,9 +7,7 @@
 use rand_chacha::ChaCha12Rng;
 
 use super::draw::{between, log_between, normal};
-
-/// Step of the window grid, s.
-pub const WINDOW_STEP_S: f64 = 25.0;
+use crate::diagnose::case::WINDOW_STRIDE_S;
 
 /// What the noise of one record is.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,7 +134,7 @@ impl Whitening {
 }
 
 fn keep(time_s: f64) -> f64 {
-    (-WINDOW_STEP_S / time_s).exp()
+    (-WINDOW_STRIDE_S / time_s).exp()
 }
 
 /// Covariance one window on: the first half becomes the one before, a fresh one arrives, the slow states relax.

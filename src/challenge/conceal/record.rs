@@ -8,22 +8,23 @@ use rand_chacha::ChaCha12Rng;
 use super::draw::{between, log_between, normal, pick};
 use super::flight::{FILE_STRIDE, Flight, LENGTH_S, MARGIN_S, STEP_S};
 use super::force;
-use super::noise::{Noise, WINDOW_STEP_S};
+use super::noise::Noise;
+use crate::diagnose::case::WINDOW_STRIDE_S;
 
 /// Half of a window, in points of the 5 s grid.
 const HALF_WINDOW: usize = 5;
 
 /// The grid of window centres, s: every 25 s, the first 25 s into the recording.
 pub fn centres_s(flight: &Flight) -> Vec<f64> {
-    let windows = (LENGTH_S / WINDOW_STEP_S) as usize - 1;
-    (0..windows).map(|k| flight.start_s + WINDOW_STEP_S * (k + 1) as f64).collect()
+    let windows = (LENGTH_S / WINDOW_STRIDE_S) as usize - 1;
+    (0..windows).map(|k| flight.start_s + WINDOW_STRIDE_S * (k + 1) as f64).collect()
 }
 
 /// Mean over the 50 s window about each centre (trapezoid on the 5 s grid), one series per axis.
 pub fn window_means(flight: &Flight, series: &[Vector3<f64>]) -> [Vec<f64>; 3] {
     let windows = centres_s(flight).len();
-    let first = ((MARGIN_S + WINDOW_STEP_S) / STEP_S) as usize;
-    let stride = (WINDOW_STEP_S / STEP_S) as usize;
+    let first = ((MARGIN_S + WINDOW_STRIDE_S) / STEP_S) as usize;
+    let stride = (WINDOW_STRIDE_S / STEP_S) as usize;
     std::array::from_fn(|axis| {
         (0..windows)
             .map(|w| {

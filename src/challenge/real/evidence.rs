@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use super::{NOTHING, Outcome, Score};
 use crate::diagnose::answer::ParameterAnswer;
-use crate::diagnose::measured::page::{self, STYLE};
+use crate::diagnose::measured::page::{number, section, with_error};
 use crate::diagnose::measured::{Answer, Plates};
+use crate::paper::page::{close, escaped, open, words};
 
 /// What this page has beside a case's own.
 const MORE: &str = "
@@ -45,23 +46,17 @@ pub struct Whole {
 impl Evidence {
     /// The page; the plates are those of the cases, in their order.
     pub fn html(&self, plates: &[Plates]) -> String {
-        let mut page = String::new();
-        let _ = write!(
-            page,
-            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-             <title>Real recordings: what was left out, and found</title><style>{STYLE}{MORE}</style></head>\n<body>\n"
-        );
-        page.push_str("<h1>Real recordings: what was left out, and found</h1>\n");
+        let title = "Real recordings: what was left out, and found";
+        let mut page = open(title, title, MORE, "");
         let _ = writeln!(page, "<p class=\"sentence\">{}</p>", escaped(&self.summary()));
         let _ = writeln!(page, "<p>{LIMITS}</p>");
         self.lot(&mut page);
         for (whole, plates) in self.cases.iter().zip(plates) {
             let _ = writeln!(page, "<h2 class=\"case\">{}, {}</h2>", escaped(&whole.answer.case), escaped(&whole.with));
-            page.push_str(&page::section(&whole.answer, plates, "h3"));
+            section(&mut page, &whole.answer, plates, "h3");
         }
         self.table(&mut page);
-        page.push_str("</body></html>\n");
+        close(&mut page, "");
         page
     }
 
@@ -123,7 +118,7 @@ impl Evidence {
         );
         for draw in &self.draws {
             let list = |all: &[ParameterAnswer]| {
-                let one = |p: &ParameterAnswer| escaped(&page::with_error(p));
+                let one = |p: &ParameterAnswer| escaped(&with_error(p));
                 all.iter().map(one).collect::<Vec<_>>().join("<br>")
             };
             let named = if draw.named.is_empty() { NOTHING.to_owned() } else { draw.named.join(", ") };
@@ -138,22 +133,14 @@ impl Evidence {
                 escaped(&words(&named)),
                 list(&draw.coefficients),
                 list(&draw.truth.coefficients),
-                page::number(draw.rms[0]),
-                page::number(draw.rms[1]),
+                number(draw.rms[0]),
+                number(draw.rms[1]),
             );
         }
         page.push_str("</tbody></table>\n");
     }
 }
 
-fn words(id: &str) -> String {
-    id.replace('_', " ")
-}
-
 fn share(good: usize, of: usize) -> String {
     if of == 0 { "-".to_owned() } else { format!("{:.1} %", 100.0 * good as f64 / of as f64) }
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -169,7 +169,7 @@ fn orbit_said(problem: &Problem, degree_left: usize, removed: &str) -> Said {
     let arc = &answer.arcs[0];
     Said {
         named: answer.effects.iter().map(|e| e.id.clone()).collect(),
-        verdict: word(&arc.verdict),
+        verdict: arc.verdict.word().to_owned(),
         coefficients: answer.effects.iter().flat_map(|e| e.parameters.clone()).collect(),
         rms: [arc.rms_before, arc.rms_after],
     }
@@ -201,8 +201,4 @@ fn axis_said(series: &Series, axis: usize, full: &[Follows], removed: &str) -> S
         coefficients: (0..found.effects.len()).map(of).collect(),
         rms: [found.fits[0].rms(), last.rms()],
     }
-}
-
-fn word(verdict: &crate::diagnose::answer::Verdict) -> String {
-    serde_json::to_value(verdict).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
 }

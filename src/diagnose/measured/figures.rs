@@ -1,10 +1,14 @@
 //! The figures of these cases as SVG texts: grey for what was, blue for what is left, red for what cannot be explained.
 
+use std::ops::Range;
+
 use plotters::prelude::*;
 
 use super::plates::{OrbitPlate, Plates, PosesPlate, SeriesPlate};
 use super::spread::median;
-use crate::diagnose::report::figures::{AFTER, CLAIM, Drawn, GREY, INK, on_canvas, said, text};
+use crate::paper::Drawn;
+use crate::paper::drawing::{BLUE, Canvas, Chart, GREY, INK, RED, mesh, on_canvas, said, text};
+use crate::paper::page::words;
 
 /// File name, caption and drawing of each figure of a case; what has nothing to show is left out.
 pub fn all(plates: &Plates) -> Vec<(&'static str, &'static str, Drawn)> {
@@ -56,9 +60,8 @@ fn series(axes: &[SeriesPlate]) -> Drawn {
                 .y_label_area_size(74)
                 .build_cartesian_2d(first..last, -high * scale..high * scale)
                 .map_err(said)?;
-            let mut mesh = chart.configure_mesh();
-            mesh.disable_x_mesh().light_line_style(TRANSPARENT).bold_line_style(GREY.mix(0.25)).axis_style(GREY);
-            mesh.y_labels(3).axis_desc_style(text(12)).label_style(text(11)).y_desc(name);
+            let mut mesh = mesh(&mut chart);
+            mesh.disable_x_mesh().y_labels(3).label_style(text(11)).y_desc(name);
             mesh.x_labels(if k + 1 == axes.len() { 10 } else { 0 });
             if k + 1 == axes.len() {
                 mesh.x_desc("hours after the first row");
@@ -71,7 +74,7 @@ fn series(axes: &[SeriesPlate]) -> Drawn {
                 |y: &[f64], colour: RGBColor| points(y).into_iter().map(move |p| Circle::new(p, 1, colour.filled()));
             chart.draw_series(dots(&axis.before, GREY)).map_err(said)?;
             if axis.after != axis.before {
-                chart.draw_series(dots(&axis.after, AFTER)).map_err(said)?;
+                chart.draw_series(dots(&axis.after, BLUE)).map_err(said)?;
             }
             let control = if axis.control { " (control)" } else { "" };
             panel.draw(&Text::new(format!("{}{control}", axis.name), (84, 10), text(13))).map_err(said)?;
@@ -89,7 +92,7 @@ fn decades(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     if high > 0.0 { (low.log10().floor(), high.log10().ceil().max(low.log10().floor() + 1.0)) } else { (-3.0, 0.0) }
 }
 
-fn label(power: f64) -> String {
+fn power_of_ten(power: f64) -> String {
     match power.round() as i32 {
         p if (power - power.round()).abs() > 0.01 || p > 4 => String::new(),
         p if p >= 0 => format!("{:.0}", 10f64.powi(p)),
@@ -97,51 +100,73 @@ fn label(power: f64) -> String {
     }
 }
 
-fn words(id: &str) -> String {
-    id.replace("solar_radiation_pressure", "solar radiation").replace("_bias", " bias").replace('_', " ")
+/// An axis along a panel: its labels, how many at most, what it is, and the height they take.
+struct Along<'p> {
+    span: Range<f64>,
+    labels: usize,
+    label: &'p dyn Fn(&f64) -> String,
+    name: &'static str,
+    height: u32,
+}
+
+/// A panel over powers of ten.
+fn log_panel<'a, 'b>(
+    canvas: &'a Canvas<'b>,
+    along: Along,
+    (low, high): (f64, f64),
+    name: &str,
+    width: u32,
+) -> Result<Chart<'a, 'b>, String> {
+    let mut chart = ChartBuilder::on(canvas)
+        .margin(10)
+        .x_label_area_size(along.height)
+        .y_label_area_size(width)
+        .build_cartesian_2d(along.span, low..high)
+        .map_err(said)?;
+    let mut mesh = mesh(&mut chart);
+    mesh.disable_x_mesh()
+        .x_labels(along.labels)
+        .y_labels((high - low) as usize + 1)
+        .y_desc(name)
+        .axis_desc_style(text(14))
+        .x_label_formatter(along.label)
+        .y_label_formatter(&|y| power_of_ten(*y));
+    if !along.name.is_empty() {
+        mesh.x_desc(along.name);
+    }
+    mesh.draw().map_err(said)?;
+    Ok(chart)
+}
+
+/// What a level added, in few words.
+fn brief(id: &str) -> String {
+    words(&id.replace("solar_radiation_pressure", "solar radiation"))
 }
 
 fn ladder(plate: &OrbitPlate) -> Drawn {
     on_canvas(360, |canvas| {
         let (low, high) = decades(plate.rms_m.iter().flatten().copied().chain([plate.rms_max_m]));
         let levels = plate.rms_m.len();
-        let mut chart = ChartBuilder::on(canvas)
-            .margin(10)
-            .x_label_area_size(34)
-            .y_label_area_size(70)
-            .build_cartesian_2d(-0.25..levels as f64 - 0.75, low..high)
-            .map_err(said)?;
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(GREY.mix(0.25))
-            .axis_style(GREY)
-            .x_labels(levels * 4)
-            .y_labels((high - low) as usize + 1)
-            .y_desc("3-D rms, m")
-            .axis_desc_style(text(14))
-            .label_style(text(12))
-            .y_label_formatter(&|y| label(*y))
-            .x_label_formatter(&|x| match plate.added.get(x.round() as usize) {
-                Some(added) if (x - x.round()).abs() < 1e-6 && *x > -0.01 => words(added),
-                _ => String::new(),
-            })
-            .draw()
-            .map_err(said)?;
+        let label = |x: &f64| match plate.added.get(x.round() as usize) {
+            Some(added) if (x - x.round()).abs() < 1e-6 && *x > -0.01 => brief(added),
+            _ => String::new(),
+        };
+        let span = -0.25..levels as f64 - 0.75;
+        let along = Along { span, labels: levels * 4, label: &label, name: "", height: 34 };
+        let mut chart = log_panel(canvas, along, (low, high), "3-D rms, m", 70)?;
         for arc in 0..plate.arcs.len() {
             let odd = plate.rms_m[levels - 1][arc] > plate.rms_max_m;
             let line = (0..levels).map(|k| (k as f64, plate.rms_m[k][arc].max(1e-6).log10()));
-            let colour = if odd { CLAIM.stroke_width(2) } else { GREY.mix(0.5).stroke_width(1) };
+            let colour = if odd { RED.stroke_width(2) } else { GREY.mix(0.5).stroke_width(1) };
             chart.draw_series(LineSeries::new(line, colour)).map_err(said)?;
             if odd {
                 let end = (levels as f64 - 0.97, plate.rms_m[levels - 1][arc].log10());
-                chart.draw_series([Text::new(plate.arcs[arc].clone(), end, text(12).color(&CLAIM))]).map_err(said)?;
+                chart.draw_series([Text::new(plate.arcs[arc].clone(), end, text(12).color(&RED))]).map_err(said)?;
             }
         }
         let middle = |k: usize| median(plate.rms_m[k].iter().copied()).max(1e-6).log10();
         chart
-            .draw_series(LineSeries::new((0..levels).map(|k| (k as f64, middle(k))), AFTER.stroke_width(3)))
+            .draw_series(LineSeries::new((0..levels).map(|k| (k as f64, middle(k))), BLUE.stroke_width(3)))
             .map_err(said)?;
         let limit = plate.rms_max_m.log10();
         let dashes = DashedLineSeries::new([(-0.25, limit), (levels as f64 - 0.75, limit)], 6, 5, INK.into());
@@ -156,30 +181,12 @@ fn arcs(plate: &OrbitPlate) -> Drawn {
         let (low, high) = decades(first.iter().chain(last).copied().chain([plate.rms_max_m]));
         let n = plate.arcs.len();
         let every = n.div_ceil(34).max(1);
-        let mut chart = ChartBuilder::on(canvas)
-            .margin(10)
-            .x_label_area_size(28)
-            .y_label_area_size(70)
-            .build_cartesian_2d(-1.0..n as f64, low..high)
-            .map_err(said)?;
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(GREY.mix(0.25))
-            .axis_style(GREY)
-            .x_labels(0)
-            .y_labels((high - low) as usize + 1)
-            .y_desc("3-D rms, m")
-            .axis_desc_style(text(14))
-            .label_style(text(12))
-            .y_label_formatter(&|y| label(*y))
-            .draw()
-            .map_err(said)?;
+        let along = Along { span: -1.0..n as f64, labels: 0, label: &|_| String::new(), name: "", height: 28 };
+        let mut chart = log_panel(canvas, along, (low, high), "3-D rms, m", 70)?;
         for k in 0..n {
             let x = k as f64;
             let (was, is) = (first[k].max(1e-6).log10(), last[k].max(1e-6).log10());
-            let colour = if last[k] > plate.rms_max_m { CLAIM } else { AFTER };
+            let colour = if last[k] > plate.rms_max_m { RED } else { BLUE };
             chart.draw_series(LineSeries::new([(x, was), (x, is)], GREY.mix(0.4).stroke_width(1))).map_err(said)?;
             chart.draw_series([Circle::new((x, was), 3, GREY.filled())]).map_err(said)?;
             chart.draw_series([Circle::new((x, is), 4, colour.filled())]).map_err(said)?;
@@ -200,28 +207,10 @@ fn poses(plate: &PosesPlate) -> Drawn {
     on_canvas(280, |canvas| {
         let (low, high) = decades(first.iter().chain(last).map(|r| r.abs()));
         let low = low.max(high - 6.0);
-        let mut chart = ChartBuilder::on(canvas)
-            .margin(10)
-            .x_label_area_size(34)
-            .y_label_area_size(76)
-            .build_cartesian_2d(0.0..first.len() as f64 + 1.0, low..high)
-            .map_err(said)?;
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(GREY.mix(0.25))
-            .axis_style(GREY)
-            .y_labels((high - low) as usize + 1)
-            .y_desc("| |a| - g |, m/s²")
-            .x_desc("pose")
-            .axis_desc_style(text(14))
-            .label_style(text(12))
-            .x_label_formatter(&|x| format!("{x:.0}"))
-            .y_label_formatter(&|y| label(*y))
-            .draw()
-            .map_err(said)?;
-        for (values, colour) in [(first, GREY), (last, AFTER)] {
+        let span = 0.0..first.len() as f64 + 1.0;
+        let along = Along { span, labels: 11, label: &|x| format!("{x:.0}"), name: "pose", height: 34 };
+        let mut chart = log_panel(canvas, along, (low, high), "| |a| - g |, m/s²", 76)?;
+        for (values, colour) in [(first, GREY), (last, BLUE)] {
             let at = values.iter().enumerate().map(|(i, r)| ((i + 1) as f64, r.abs().log10().max(low)));
             chart.draw_series(at.map(|p| Circle::new(p, 4, colour.filled()))).map_err(said)?;
         }

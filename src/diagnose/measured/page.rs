@@ -7,40 +7,29 @@ use std::fmt::Write;
 use super::answer::{ArcAnswer, Effect};
 use super::{Answer, Plates, figures};
 use crate::diagnose::answer::{ParameterAnswer, Verdict};
-use crate::diagnose::report::Report;
-pub(crate) use crate::diagnose::report::page::STYLE;
-use crate::diagnose::report::page::{escaped, figure_of, probability, table, verdict_word};
-use crate::diagnose::report::sentence::words;
+use crate::diagnose::report::page::{open_diagnosis, probability};
+use crate::diagnose::report::sentence::lower_first;
+use crate::paper::page::{close, escaped, figure, table, words};
+use crate::paper::{Figures, Report};
 
 /// Draws the report of an answer.
 pub fn report(answer: &Answer, plates: &Plates) -> Report {
-    let mut page = String::new();
-    let verdict = verdict_word(answer.verdict);
-    let _ = write!(
-        page,
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-         <title>Diagnosis of {}: {verdict}</title><style>{STYLE}</style></head>\n<body class=\"{verdict}\">\n",
-        escaped(&answer.case)
+    let mut html = open_diagnosis(&answer.case, answer.verdict);
+    let figures = section(&mut html, answer, plates, "h2");
+    close(
+        &mut html,
+        "Simulation and effects pass through the same measurement as the data; missing data are never filled. Errors are one standard \
+         error, with the memory of what is left in them.",
     );
-    let _ = writeln!(page, "<h1>Recording against simulation: {}</h1>", escaped(&answer.case));
-    page.push_str(&section(answer, plates, "h2"));
-    page.push_str(
-        "<footer><p>Simulation and effects pass through the same measurement as the data; missing data are never filled. Errors are \
-         one standard error, with the memory of what is left in them.</p></footer>\n</body></html>\n",
-    );
-    let drawn = figures::all(plates);
-    let figures = drawn.into_iter().filter_map(|(name, _, svg)| Some((name, svg.ok()?))).collect();
-    Report { html: page, figures }
+    Report { html, figures }
 }
 
-/// Everything about one case, for a page that may hold several; `heading` is the tag of its headings.
-pub fn section(answer: &Answer, plates: &Plates, heading: &str) -> String {
-    let mut out = String::new();
+/// Writes everything about one case on a page that may hold several; `heading` is the tag of its headings. Gives its figures.
+pub fn section(out: &mut String, answer: &Answer, plates: &Plates, heading: &str) -> Vec<(String, String)> {
     let _ = writeln!(
         out,
         "<p class=\"under\">Verdict: {} · false-alarm probability {}</p>",
-        verdict_word(answer.verdict),
+        answer.verdict.word(),
         probability(answer.false_alarm_probability)
     );
     let _ = writeln!(out, "<p class=\"sentence\">{}</p>", escaped(&sentence(answer)));
@@ -48,36 +37,35 @@ pub fn section(answer: &Answer, plates: &Plates, heading: &str) -> String {
         let _ = writeln!(out, "<{heading}>{title}</{heading}>");
     };
     if !answer.effects.is_empty() {
-        head(&mut out, "What the simulation lacks");
-        effects(&mut out, answer);
+        head(out, "What the simulation lacks");
+        effects(out, answer);
     }
-    let mut missing = Vec::new();
-    for (name, caption, svg) in figures::all(plates) {
-        match svg {
-            Ok(svg) => figure_of(&mut out, &[(name, svg)], name, caption),
-            Err(reason) => missing.push(format!("{name}: {reason}")),
-        }
+    let (captions, drawn): (Vec<_>, Vec<_>) =
+        figures::all(plates).into_iter().map(|(name, caption, svg)| ((name, caption), (name, svg))).unzip();
+    let Figures { shown, missing } = Figures::of(drawn);
+    for (name, caption) in captions {
+        figure(out, &shown, name, caption);
     }
-    head(&mut out, "Does it predict?");
-    predicts(&mut out, answer);
+    head(out, "Does it predict?");
+    predicts(out, answer);
     if answer.arcs.len() > 1 {
-        head(&mut out, "One by one");
-        arcs(&mut out, answer);
+        head(out, "One by one");
+        arcs(out, answer);
     }
     if !answer.upper_limits.is_empty() {
-        head(&mut out, "How small everything else must be");
+        head(out, "How small everything else must be");
         let rows = answer.upper_limits.iter().map(|l| vec![words(&l.id), format!("{:.2e}", l.limit), l.unit.clone()]);
-        table(&mut out, &["effect", "#below (95 %)", "unit"], rows);
+        table(out, "", &["effect", "#below (95 %)", "unit"], rows);
     }
     if !answer.notes.is_empty() || !missing.is_empty() {
-        head(&mut out, "To know before trusting the figures");
+        head(out, "To know before trusting the figures");
         out.push_str("<ul>");
         for note in answer.notes.iter().chain(&missing) {
             let _ = write!(out, "<li>{}</li>", escaped(note));
         }
         out.push_str("</ul>\n");
     }
-    out
+    shown
 }
 
 /// What is missing, and what is left, in a sentence or two.
@@ -105,17 +93,6 @@ pub fn sentence(answer: &Answer) -> String {
         let _ = write!(text, " {} stays unexplained, and is given no cause.", odd.join(", "));
     }
     text
-}
-
-fn lower_first(name: &str) -> String {
-    // A lone capital is a symbol.
-    let mut letters = name.chars();
-    match (letters.next(), letters.as_str()) {
-        (Some(first), rest) if rest.starts_with(char::is_lowercase) => {
-            first.to_lowercase().chain(rest.chars()).collect()
-        }
-        _ => name.to_owned(),
-    }
 }
 
 fn listed(names: &[String]) -> String {
@@ -162,7 +139,7 @@ fn effects(out: &mut String, answer: &Answer) {
         let all: Vec<String> = axis.chain(effect.parameters.iter().map(own)).collect();
         vec![effect.name.clone(), all.join("; "), effect.why.clone()]
     });
-    table(out, &["what", "coefficients", "why"], rows);
+    table(out, "", &["what", "coefficients", "why"], rows);
 }
 
 fn predicts(out: &mut String, answer: &Answer) {
@@ -176,7 +153,7 @@ fn predicts(out: &mut String, answer: &Answer) {
         let unit = &answer.unit;
         let heads =
             ["added", &format!("#rms of the fit, {unit}"), &format!("#rms of data not fitted, {unit}"), "#evidence"];
-        table(out, &heads, rows);
+        table(out, "", &heads, rows);
     }
     let Some(held) = &answer.fit.held_out else {
         out.push_str("<p>No data were held back: all were fitted.</p>\n");
@@ -204,7 +181,7 @@ fn arcs(out: &mut String, answer: &Answer) {
         };
         vec![
             arc.id.clone(),
-            verdict_word(arc.verdict).to_owned(),
+            arc.verdict.word().to_owned(),
             number(arc.rms_before),
             number(arc.rms_after),
             arc.predicted_rms.map_or("-".to_owned(), number),
@@ -215,7 +192,7 @@ fn arcs(out: &mut String, answer: &Answer) {
     });
     let unit = &answer.unit;
     let what = if many { "first coefficients" } else { "coefficients" };
-    table(out, &["", "verdict", "#before", "#after", &format!("#not fitted, {unit}"), what, "what is left"], rows);
+    table(out, "", &["", "verdict", "#before", "#after", &format!("#not fitted, {unit}"), what, "what is left"], rows);
 }
 
 fn left(arc: &ArcAnswer) -> String {

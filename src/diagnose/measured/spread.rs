@@ -1,13 +1,10 @@
 //! Medians, and how many independent values a series with memory is worth.
 
+use crate::math::robust;
+
 /// Median; of nothing, zero.
 pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => 0.0,
-        n => 0.5 * (values[n / 2] + values[(n - 1) / 2]),
-    }
+    robust::median(&mut values.into_iter().collect::<Vec<_>>()).unwrap_or(0.0)
 }
 
 /// Scatter about the median: 1.4826 times the median absolute deviation.

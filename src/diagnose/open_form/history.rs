@@ -1,6 +1,7 @@
 //! Forms with a memory: after the edges of the shadow, after logged events, after manoeuvres, with the time.
 
 use super::Collector;
+use crate::diagnose::case::HALF_WINDOW_S;
 use crate::diagnose::measure::{coverage, decay};
 use crate::diagnose::scene::Scene;
 
@@ -22,8 +23,8 @@ pub(super) fn since(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f
     let mut sum = vec![0.0; clock.len()];
     for (n, (instant, amplitude)) in instants.iter().enumerate() {
         let next = instants.get(n + 1).map_or(f64::INFINITY, |(t, _)| *t);
-        let first = clock.partition_point(|t| t + 25.0 <= *instant);
-        let last = clock.partition_point(|t| t - 25.0 < next.min(instant + 12.0 * tau_s)).max(first);
+        let first = clock.partition_point(|t| t + HALF_WINDOW_S <= *instant);
+        let last = clock.partition_point(|t| t - HALF_WINDOW_S < next.min(instant + 12.0 * tau_s)).max(first);
         let pulse = decay(&clock[first..last], *instant, tau_s);
         // What the next one replaces: the same decay continued after it.
         let gone = if next.is_finite() { decay(&clock[first..last], next, tau_s) } else { vec![0.0; last - first] };

@@ -16,6 +16,7 @@ use crate::diagnose::answer::{Located, Verdict};
 use crate::diagnose::measured::answer::{ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, parameter, posterior};
 use crate::diagnose::measured::plates::PosesPlate;
 use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates, texts};
+use crate::math::rms::rms;
 
 /// Readings at zero acceleration that makers of triads use: none, or the middle of so many bits.
 const ZEROS: [f64; 9] = [0.0, 512.0, 2_048.0, 8_192.0, 32_768.0, 131_072.0, 524_288.0, 2_097_152.0, 8_388_608.0];
@@ -449,8 +450,4 @@ fn held_out(parts: &[Part], poses: &[Pose], gravity: f64) -> f64 {
     let mut missed = fit(parts, &even, gravity).predict(&odd, gravity);
     missed.extend(fit(parts, &odd, gravity).predict(&even, gravity));
     rms(&missed)
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }

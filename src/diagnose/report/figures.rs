@@ -1,45 +1,17 @@
 //! The figures, as SVG texts: grey for what was, one colour for what is claimed, bands for the shadow, ticks for the log.
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::Plates;
-use super::reduce::{Bin, amplitudes, binned, range, rms, runs, spans};
-
-pub(in crate::diagnose) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-pub(in crate::diagnose) type Drawn = Result<String, String>;
+use super::reduce::{Bin, amplitudes, binned, range, runs, spans};
+use crate::math::rms::rms;
+use crate::paper::Drawn;
+use crate::paper::drawing::{BLUE, Canvas, GREY, INK, RED, mesh, on_canvas, said, text};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
-/// On A4 paper a pixel of this is two thirds of a point: the smallest letters are then 7 pt high.
-const WIDTH: u32 = 760;
-/// The drawing library makes letters smaller by this than what they are ordered as.
-const LETTERS: f64 = 1.24;
-pub(in crate::diagnose) const GREY: RGBColor = RGBColor(140, 140, 140);
-pub(in crate::diagnose) const INK: RGBColor = RGBColor(40, 40, 40);
-pub(in crate::diagnose) const CLAIM: RGBColor = RGBColor(178, 58, 46);
-pub(in crate::diagnose) const AFTER: RGBColor = RGBColor(38, 84, 124);
 const SHADOW: RGBAColor = RGBAColor(70, 90, 130, 0.10);
 /// Mean that a point of a time line stands for, s.
 const LINE_S: f64 = 600.0;
-
-pub(in crate::diagnose) fn text(size: u32) -> TextStyle<'static> {
-    TextStyle::from(("Helvetica, Arial, sans-serif", LETTERS * f64::from(size)).into_font()).color(&INK)
-}
-
-pub(in crate::diagnose) fn on_canvas(height: u32, draw: impl FnOnce(&Canvas) -> Result<(), String>) -> Drawn {
-    let mut svg = String::new();
-    {
-        let canvas = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
-        canvas.fill(&WHITE).map_err(said)?;
-        draw(&canvas)?;
-        canvas.present().map_err(said)?;
-    }
-    Ok(svg)
-}
-
-pub(in crate::diagnose) fn said(error: impl std::fmt::Display) -> String {
-    error.to_string()
-}
 
 fn hours(plates: &Plates, clock_s: f64) -> f64 {
     (clock_s - plates.liftoff_clock_s) / 3600.0
@@ -50,7 +22,7 @@ pub fn residual(plates: &Plates) -> Drawn {
     timelines(plates, |axis| {
         let mut lines = vec![(GREY, 1, plates.before_ng[axis].as_slice(), "recording less simulation")];
         if plates.model_ng[axis].iter().any(|m| *m != 0.0) {
-            lines.push((CLAIM, 2, plates.model_ng[axis].as_slice(), "what is claimed"));
+            lines.push((RED, 2, plates.model_ng[axis].as_slice(), "what is claimed"));
         }
         lines
     })
@@ -62,7 +34,7 @@ pub fn after(plates: &Plates) -> Drawn {
         return Ok(String::new());
     }
     let left = left(plates);
-    timelines(plates, |axis| vec![(AFTER, 1, left[axis].as_slice(), "left after the claimed part")])
+    timelines(plates, |axis| vec![(BLUE, 1, left[axis].as_slice(), "left after the claimed part")])
 }
 
 fn left(plates: &Plates) -> [Vec<f64>; 3] {
@@ -92,17 +64,11 @@ fn timelines<'p>(plates: &'p Plates, lines: impl Fn(usize) -> Vec<Line<'p>>) -> 
                 .iter()
                 .map(|(a, b)| Rectangle::new([(hours(plates, *a), -high), (hours(plates, *b), high)], SHADOW.filled()));
             chart.draw_series(bands).map_err(said)?;
-            chart
-                .configure_mesh()
+            mesh(&mut chart)
                 .disable_x_mesh()
-                .light_line_style(TRANSPARENT)
-                .bold_line_style(GREY.mix(0.25))
-                .axis_style(GREY)
                 .x_labels(0)
                 .y_labels(5)
                 .y_desc(format!("{}, ng", AXES[axis]))
-                .axis_desc_style(text(12))
-                .label_style(text(12))
                 .y_label_formatter(&|y| format!("{y:.0}"))
                 .draw()
                 .map_err(said)?;
@@ -143,15 +109,11 @@ fn log_strip(plates: &Plates, area: &Canvas, time: std::ops::Range<f64>) -> Resu
         .y_label_area_size(64)
         .build_cartesian_2d(time.clone(), 0.0..rows)
         .map_err(said)?;
-    chart
-        .configure_mesh()
+    mesh(&mut chart)
         .disable_mesh()
-        .axis_style(GREY)
         .y_labels(0)
         .x_labels(12)
         .x_desc("hours since lift-off")
-        .axis_desc_style(text(12))
-        .label_style(text(12))
         .x_label_formatter(&|x| format!("{x:.0}"))
         .draw()
         .map_err(said)?;
@@ -217,23 +179,18 @@ fn panel_of_bins(panel: &Canvas, name: &str, before: &[Bin], after: &[Bin]) -> R
         .y_label_area_size(44)
         .build_cartesian_2d(low..high, -size..size)
         .map_err(said)?;
-    chart
-        .configure_mesh()
+    mesh(&mut chart)
         .disable_x_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(GREY.mix(0.25))
-        .axis_style(GREY)
         .x_labels(4)
         .y_labels(5)
         .x_desc(name)
         .y_desc("ng")
-        .axis_desc_style(text(12))
         .label_style(text(11))
         .x_label_formatter(&|x| format!("{x:.digits$}"))
         .y_label_formatter(&|y| format!("{y:.0}"))
         .draw()
         .map_err(said)?;
-    for (bins, colour) in [(before, GREY), (after, AFTER)] {
+    for (bins, colour) in [(before, GREY), (after, BLUE)] {
         let bars = bins
             .iter()
             .map(|b| PathElement::new([(b.x, b.mean - b.error), (b.x, b.mean + b.error)], colour.stroke_width(1)));
@@ -264,15 +221,8 @@ pub fn spectrum(plates: &Plates) -> Drawn {
                 .y_label_area_size(64)
                 .build_cartesian_2d(0.0..6.0, 0.0..high)
                 .map_err(said)?;
-            let mut mesh = chart.configure_mesh();
-            mesh.light_line_style(TRANSPARENT)
-                .bold_line_style(GREY.mix(0.25))
-                .axis_style(GREY)
-                .x_labels(if bottom { 7 } else { 0 })
-                .y_labels(4)
-                .y_desc(format!("{}, ng", AXES[axis]))
-                .axis_desc_style(text(12))
-                .label_style(text(12));
+            let mut mesh = mesh(&mut chart);
+            mesh.x_labels(if bottom { 7 } else { 0 }).y_labels(4).y_desc(format!("{}, ng", AXES[axis]));
             if bottom {
                 mesh.x_desc("cycles per orbit").x_label_formatter(&|x| format!("{x:.0}"));
             }
@@ -280,7 +230,7 @@ pub fn spectrum(plates: &Plates) -> Drawn {
             let line = |y: &[f64]| cycles.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
             chart.draw_series(LineSeries::new(line(&before), GREY.stroke_width(1))).map_err(said)?;
             if claimed {
-                chart.draw_series(LineSeries::new(line(&of(&left[axis])), AFTER.stroke_width(2))).map_err(said)?;
+                chart.draw_series(LineSeries::new(line(&of(&left[axis])), BLUE.stroke_width(2))).map_err(said)?;
             }
         }
         Ok(())
@@ -304,22 +254,16 @@ pub fn ladder(plates: &Plates) -> Drawn {
             .y_label_area_size(330)
             .build_cartesian_2d((low - pad).min(0.0)..high + pad, 0.0..rows as f64)
             .map_err(said)?;
-        chart
-            .configure_mesh()
+        mesh(&mut chart)
             .disable_y_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(GREY.mix(0.25))
-            .axis_style(GREY)
             .y_labels(0)
             .x_desc("log evidence against nothing")
-            .axis_desc_style(text(12))
-            .label_style(text(12))
             .x_label_formatter(&|x| format!("{x:.0}"))
             .draw()
             .map_err(said)?;
         for (k, (name, evidence)) in shown.iter().enumerate() {
             let row = (rows - 1 - k) as f64;
-            let colour = if k == 0 { CLAIM.mix(0.85) } else { GREY.mix(0.6) };
+            let colour = if k == 0 { RED.mix(0.85) } else { GREY.mix(0.6) };
             let bar = Rectangle::new([(0.0, row + 0.25), (*evidence, row + 0.75)], colour.filled());
             chart.draw_series([bar]).map_err(said)?;
             let y = 4 + (26.0 * k as f64 + 6.0) as i32;

@@ -10,6 +10,7 @@ pub(in crate::diagnose) mod sentence;
 pub use sentence::sentence;
 
 use super::answer::Diagnosis;
+use crate::paper::{Figures, Report};
 
 /// Three axes, one value per window.
 pub type Axes = [Vec<f64>; 3];
@@ -48,35 +49,17 @@ pub struct CovariatePlate {
     pub values: Vec<f64>,
 }
 
-/// The report: the page, and its figures by file name.
-#[derive(Debug, Clone)]
-pub struct Report {
-    /// `index.html`.
-    pub html: String,
-    /// Name and SVG text of each figure.
-    pub figures: Vec<(&'static str, String)>,
-}
-
 /// Draws the report of an answer. A figure that cannot be drawn is left out and named on the page.
 pub fn report(diagnosis: &Diagnosis, plates: &Plates) -> Report {
-    let drawn = [
+    let figures = Figures::of([
         ("residual.svg", figures::residual(plates)),
         ("after.svg", figures::after(plates)),
         ("covariates.svg", figures::covariates(plates)),
         ("spectrum.svg", figures::spectrum(plates)),
         ("ladder.svg", figures::ladder(plates)),
-    ];
-    let mut figures = Vec::new();
-    let mut missing = Vec::new();
-    for (name, svg) in drawn {
-        match svg {
-            Ok(svg) if !svg.is_empty() => figures.push((name, svg)),
-            Ok(_) => {}
-            Err(reason) => missing.push(format!("{name}: {reason}")),
-        }
-    }
-    let html = page::page(diagnosis, plates, &figures, &missing);
-    Report { html, figures }
+    ]);
+    let html = page::page(diagnosis, plates, &figures);
+    Report { html, figures: figures.shown }
 }
 
 #[cfg(test)]

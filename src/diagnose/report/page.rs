@@ -3,59 +3,25 @@
 use std::fmt::Write;
 
 use super::Plates;
-use super::sentence::{figure, sentence, words};
+use super::sentence::{sentence, short};
 use crate::diagnose::answer::{Diagnosis, EffectAnswer, Verdict};
-
-pub(crate) const STYLE: &str = "
-:root { --ink: #222; --soft: #666; --rule: #d5d5d5; --claim: #b23a2e; }
-* { box-sizing: border-box; }
-body { font: 15px/1.5 Georgia, 'Times New Roman', serif; color: var(--ink); max-width: 900px; margin: 2.2em auto; padding: 0 1.2em; }
-h1 { font-size: 1.55em; font-weight: normal; margin: 0 0 .1em; }
-h2 { font-size: 1.1em; margin: 2em 0 .5em; border-bottom: 1px solid var(--rule); padding-bottom: .2em; }
-p { margin: .5em 0; max-width: 48em; }
-.under { color: var(--soft); margin: 0 0 1.2em; }
-.sentence { font-size: 1.15em; border-left: 4px solid var(--claim); padding: .3em 0 .3em .9em; margin: 1em 0; max-width: 44em; }
-.consistent .sentence { border-color: #4a7c59; }
-table { border-collapse: collapse; margin: .6em 0 1em; font: 13.5px/1.45 Helvetica, Arial, sans-serif; font-variant-numeric: tabular-nums; }
-th { text-align: left; font-weight: bold; border-bottom: 1.5px solid var(--ink); padding: .2em 1.4em .2em 0; }
-td { border-bottom: 1px solid var(--rule); padding: .22em 1.4em .22em 0; vertical-align: top; }
-td.n, th.n { text-align: right; }
-figure { margin: 1em 0 1.4em; page-break-inside: avoid; break-inside: avoid; }
-figure svg { width: 100%; height: auto; display: block; }
-figcaption { color: var(--soft); font-size: .9em; max-width: 52em; }
-.columns { columns: 2; column-gap: 3em; } .columns table { width: 100%; break-inside: auto; margin-top: 0; }
-footer { margin-top: 3em; border-top: 1px solid var(--rule); color: var(--soft); font-size: .85em; }
-@page { size: A4; margin: 16mm 15mm; }
-@media print {
-  body { font-size: 10.5pt; max-width: none; margin: 0; padding: 0; }
-  h2 { break-after: avoid; } table, .sentence { break-inside: avoid; } tr { break-inside: avoid; }
-  table { font-size: 9pt; }
-}
-";
+use crate::paper::Figures;
+use crate::paper::page::{close, escaped, figure, open, table, with_error, words};
 
 /// The whole page.
-pub fn page(d: &Diagnosis, plates: &Plates, figures: &[(&'static str, String)], missing: &[String]) -> String {
-    let mut page = String::new();
-    let verdict = verdict_word(d.verdict);
-    let _ = write!(
-        page,
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-         <title>Diagnosis of {}: {verdict}</title><style>{STYLE}</style></head>\n<body class=\"{verdict}\">\n",
-        escaped(&d.case)
-    );
-    let _ = writeln!(page, "<h1>Recording against simulation: {}</h1>", escaped(&d.case));
+pub fn page(d: &Diagnosis, plates: &Plates, Figures { shown: figures, missing }: &Figures) -> String {
+    let mut page = open_diagnosis(&d.case, d.verdict);
     let _ = writeln!(page, "<p class=\"under\">{}</p>", escaped(&under(d, plates)));
     let _ = writeln!(page, "<p class=\"sentence\">{}</p>", escaped(&sentence(d)));
     effects(&mut page, d);
-    figure_of(
+    figure(
         &mut page,
         figures,
         "residual.svg",
         "Recording less simulation in body axes (10 min means, a constant per axis removed), \
         the claimed part over it, the Earth's shadow as bands, and the mission log below.",
     );
-    figure_of(
+    figure(
         &mut page,
         figures,
         "after.svg",
@@ -63,21 +29,21 @@ pub fn page(d: &Diagnosis, plates: &Plates, figures: &[(&'static str, String)], 
     );
     held_out(&mut page, d);
     located(&mut page, d);
-    figure_of(
+    figure(
         &mut page,
         figures,
         "covariates.svg",
         "Means over 24 bins of each quantity with their standard errors. What follows a quantity makes a slope or a shape; \
         what is left should not.",
     );
-    figure_of(
+    figure(
         &mut page,
         figures,
         "spectrum.svg",
         "Amplitude of one sine at each frequency, in cycles per orbit, before (pale) and after (dark).",
     );
     competition(&mut page, d);
-    figure_of(
+    figure(
         &mut page,
         figures,
         "ladder.svg",
@@ -86,25 +52,23 @@ pub fn page(d: &Diagnosis, plates: &Plates, figures: &[(&'static str, String)], 
     );
     limits(&mut page, d);
     notes(&mut page, d, missing);
-    page.push_str(
-        "<footer><p>Simulation and every signature pass through the same 50 s window mean as the data; missing data are never filled; \
-         a constant per axis is not a finding. Errors are one standard error. Axes: X tail to nose, Y starboard, Z through the belly; \
-         1 ng is 9.80665e-9 m/s&sup2;.</p></footer>\n</body></html>\n",
+    close(
+        &mut page,
+        "Simulation and every signature pass through the same 50 s window mean as the data; missing data are never filled; a constant \
+         per axis is not a finding. Errors are one standard error. Axes: X tail to nose, Y starboard, Z through the belly; 1 ng is \
+         9.80665e-9 m/s&sup2;.",
     );
     page
 }
 
-pub(in crate::diagnose) fn verdict_word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Consistent => "consistent",
-        Verdict::Explained => "explained",
-        Verdict::Ambiguous => "ambiguous",
-        Verdict::Unexplained => "unexplained",
-    }
+/// Begins the page of a diagnosis.
+pub(in crate::diagnose) fn open_diagnosis(case: &str, verdict: Verdict) -> String {
+    let verdict = verdict.word();
+    open(&format!("Diagnosis of {case}: {verdict}"), &format!("Recording against simulation: {case}"), "", verdict)
 }
 
 fn under(d: &Diagnosis, plates: &Plates) -> String {
-    let mut line = format!("Verdict: {}", verdict_word(d.verdict));
+    let mut line = format!("Verdict: {}", d.verdict.word());
     let _ = write!(line, " · false-alarm probability {}", probability(d.false_alarm_probability));
     if let (Some(first), Some(last)) = (plates.clock_s.first(), plates.clock_s.last()) {
         let met = |t: &f64| (t - plates.liftoff_clock_s) / 3600.0;
@@ -114,49 +78,9 @@ fn under(d: &Diagnosis, plates: &Plates) -> String {
     line
 }
 
+/// A probability, with an exponent where it is below a thousandth.
 pub(in crate::diagnose) fn probability(p: f64) -> String {
     if p <= 0.0 || p >= 1e-3 { format!("{p:.3}") } else { format!("{p:.0e}") }
-}
-
-pub(in crate::diagnose) fn figure_of(page: &mut String, figures: &[(&'static str, String)], name: &str, caption: &str) {
-    let Some((_, svg)) = figures.iter().find(|(n, _)| *n == name) else { return };
-    // plotters writes width and height; the page scales by a view box.
-    let svg = with_view_box(svg);
-    let _ = writeln!(page, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
-}
-
-fn with_view_box(svg: &str) -> String {
-    let has_box = svg.get(..svg.find('>').unwrap_or(0)).is_some_and(|tag| tag.contains("viewBox"));
-    if has_box {
-        return svg.to_string();
-    }
-    let number =
-        |key: &str| svg.split_once(&format!("{key}=\"")).and_then(|(_, rest)| rest.split_once('"')).map(|(n, _)| n);
-    match (number("width"), number("height")) {
-        (Some(w), Some(h)) => svg.replacen("<svg ", &format!("<svg viewBox=\"0 0 {w} {h}\" "), 1),
-        _ => svg.to_string(),
-    }
-}
-
-pub(in crate::diagnose) fn table(page: &mut String, head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) {
-    page.push_str("<table><thead><tr>");
-    for (k, cell) in head.iter().enumerate() {
-        let _ = write!(page, "<th{}>{}</th>", class(k, head), escaped(cell.trim_start_matches('#')));
-    }
-    page.push_str("</tr></thead><tbody>");
-    for row in rows {
-        page.push_str("<tr>");
-        for (k, cell) in row.iter().enumerate() {
-            let _ = write!(page, "<td{}>{}</td>", class(k, head), escaped(cell));
-        }
-        page.push_str("</tr>");
-    }
-    page.push_str("</tbody></table>\n");
-}
-
-/// A heading that begins with `#` stands over numbers.
-fn class(k: usize, head: &[&str]) -> &'static str {
-    if head.get(k).is_some_and(|h| h.starts_with('#')) { " class=\"n\"" } else { "" }
 }
 
 fn effects(page: &mut String, d: &Diagnosis) {
@@ -165,6 +89,7 @@ fn effects(page: &mut String, d: &Diagnosis) {
             page.push_str("<h2>A description, not a cause</h2>\n");
             table(
                 page,
+                "",
                 &["formula", "axis", "unit", "where"],
                 [vec![h.formula.clone(), h.axis.clone(), h.unit.clone(), h.location.clone()]],
             );
@@ -177,7 +102,7 @@ fn effects(page: &mut String, d: &Diagnosis) {
             page,
             "<p><b>{}</b> (probability {}){}. {}</p>",
             escaped(&effect.name),
-            figure(effect.posterior),
+            short(effect.posterior),
             rms(effect),
             escaped(&effect.why)
         );
@@ -186,26 +111,14 @@ fn effects(page: &mut String, d: &Diagnosis) {
             let (value, sigma) = with_error(p.value, p.sigma);
             vec![p.name.clone(), value, sigma, p.unit.clone()]
         });
-        table(page, &["parameter", "#value", "#standard error", "unit"], axis.chain(numbers));
+        table(page, "", &["parameter", "#value", "#standard error", "unit"], axis.chain(numbers));
     }
 }
 
 fn rms(effect: &EffectAnswer) -> String {
-    effect.rms_ng.map_or(String::new(), |[x, y, z]| {
-        format!(", {}, {} and {} ng rms on x, y, z", figure(x), figure(y), figure(z))
-    })
-}
-
-/// Value and error to the error's second digit.
-pub(in crate::diagnose) fn with_error(value: f64, sigma: f64) -> (String, String) {
-    if sigma <= 0.0 || !sigma.is_finite() {
-        return (figure(value), String::new());
-    }
-    let digits = (1.0 - sigma.log10().floor()).max(0.0) as usize;
-    if digits > 7 || sigma.abs() >= 1e6 {
-        return (format!("{value:.3e}"), format!("{sigma:.1e}"));
-    }
-    (format!("{value:.digits$}"), format!("{sigma:.digits$}"))
+    effect
+        .rms_ng
+        .map_or(String::new(), |[x, y, z]| format!(", {}, {} and {} ng rms on x, y, z", short(x), short(y), short(z)))
 }
 
 fn held_out(page: &mut String, d: &Diagnosis) {
@@ -213,12 +126,13 @@ fn held_out(page: &mut String, d: &Diagnosis) {
     page.push_str("<h2>Does it predict?</h2>\n");
     let row = |name: &str, v: [f64; 3], chi2: Option<f64>| {
         let mut row = vec![name.to_string()];
-        row.extend(v.map(figure));
+        row.extend(v.map(short));
         row.push(chi2.map_or(String::new(), |c| format!("{c:.3}")));
         row
     };
     table(
         page,
+        "",
         &["rms, ng", "#x", "#y", "#z", "#whitened chi² per degree"],
         [
             row("before", fit.before.rms_ng, Some(fit.before.whitened_chi2_per_dof)),
@@ -238,8 +152,8 @@ fn held_out(page: &mut String, d: &Diagnosis) {
         page,
         "<p>Held out: {}. {removed}log score gained {} ± {}.</p>",
         escaped(&fit.held_out.scheme),
-        figure(fit.held_out.log_score_gain),
-        figure(fit.held_out.log_score_gain_se)
+        short(fit.held_out.log_score_gain),
+        short(fit.held_out.log_score_gain_se)
     );
 }
 
@@ -261,13 +175,13 @@ fn located(page: &mut String, d: &Diagnosis) {
         ]);
     }
     for covariate in &l.covariates {
-        rows.push(vec![format!("follows {}", words(&covariate.name)), format!("score {}", figure(covariate.score))]);
+        rows.push(vec![format!("follows {}", words(&covariate.name)), format!("score {}", short(covariate.score))]);
     }
     for line in &l.per_orbit_lines {
-        let place = format!("{} ng on {}", figure(line.amplitude_ng), line.axis);
+        let place = format!("{} ng on {}", short(line.amplitude_ng), line.axis);
         rows.push(vec![format!("line at {:.2} cycles per orbit", line.cycles_per_orbit), place]);
     }
-    table(page, &["what", "where"], rows);
+    table(page, "", &["what", "where"], rows);
 }
 
 fn competition(page: &mut String, d: &Diagnosis) {
@@ -284,15 +198,14 @@ fn competition(page: &mut String, d: &Diagnosis) {
         page.push_str("</ul>\n");
     }
     if let Some(s) = &d.separating_observation {
-        let gain = s
-            .gain
-            .map_or(String::new(), |gain| format!(" It would separate them by {} standard errors.", figure(gain)));
+        let gain =
+            s.gain.map_or(String::new(), |gain| format!(" It would separate them by {} standard errors.", short(gain)));
         let (kind, text) = (escaped(&words(&s.kind)), escaped(&s.text));
         let _ = writeln!(page, "<p>The cheapest observation that would decide ({kind}): {text}{gain}</p>");
     }
     if !d.alternatives.is_empty() {
-        let rows = d.alternatives.iter().map(|a| vec![joined(&a.effects), figure(a.posterior), figure(a.delta_bic)]);
-        table(page, &["alternative", "#probability", "#lacks, in 2 ln evidence"], rows);
+        let rows = d.alternatives.iter().map(|a| vec![joined(&a.effects), short(a.posterior), short(a.delta_bic)]);
+        table(page, "", &["alternative", "#probability", "#lacks, in 2 ln evidence"], rows);
     }
 }
 
@@ -303,8 +216,8 @@ fn limits(page: &mut String, d: &Diagnosis) {
     page.push_str("<h2>How small everything else must be</h2>\n<div class=\"columns\">");
     let mut limits: Vec<_> = d.upper_limits.iter().collect();
     limits.sort_by(|a, b| a.limit_ng.total_cmp(&b.limit_ng));
-    let rows = limits.iter().map(|l| vec![words(&l.id), figure(l.limit_ng)]);
-    table(page, &["effect", "#below, ng rms (95 %)"], rows);
+    let rows = limits.iter().map(|l| vec![words(&l.id), short(l.limit_ng)]);
+    table(page, "", &["effect", "#below, ng rms (95 %)"], rows);
     page.push_str("</div>\n");
 }
 
@@ -317,8 +230,4 @@ fn notes(page: &mut String, d: &Diagnosis, missing: &[String]) {
         let _ = write!(page, "<li>{}</li>", escaped(note));
     }
     page.push_str("</ul>\n");
-}
-
-pub(in crate::diagnose) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

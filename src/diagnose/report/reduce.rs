@@ -99,11 +99,6 @@ pub fn amplitudes(clock_s: &[f64], y: &[f64], period_s: f64, cycles: &[f64]) -> 
         .collect()
 }
 
-/// Root mean square about zero.
-pub fn rms(y: &[f64]) -> f64 {
-    (y.iter().map(|y| y * y).sum::<f64>() / y.len().max(1) as f64).sqrt()
-}
-
 /// Least and greatest; 0 to 1 where there is nothing.
 pub fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));

@@ -1,6 +1,7 @@
 //! The sentence a flight engineer needs, from the answer.
 
 use crate::diagnose::answer::{Diagnosis, Fit, Verdict};
+use crate::paper::page::words;
 
 /// One or two sentences: what is missing, how large it is, what to do.
 pub fn sentence(d: &Diagnosis) -> String {
@@ -15,7 +16,7 @@ pub fn sentence(d: &Diagnosis) -> String {
 fn consistent(d: &Diagnosis) -> String {
     let loosest = d.upper_limits.iter().max_by(|a, b| a.limit_ng.total_cmp(&b.limit_ng));
     let limit = loosest.map_or(String::new(), |l| {
-        format!(" The least well bounded effect, {}, stays below {} ng rms (95 %).", words(&l.id), figure(l.limit_ng))
+        format!(" The least well bounded effect, {}, stays below {} ng rms (95 %).", words(&l.id), short(l.limit_ng))
     });
     format!("The recording agrees with the simulation within its noise: there is nothing to correct.{limit}")
 }
@@ -25,7 +26,7 @@ fn explained(d: &Diagnosis) -> String {
         .effects
         .iter()
         .map(|e| {
-            let size = e.rms_ng.map_or(String::new(), |r| format!(" ({} ng rms)", figure(norm(r))));
+            let size = e.rms_ng.map_or(String::new(), |r| format!(" ({} ng rms)", short(norm(r))));
             format!("{}{size}", lower_first(&e.name))
         })
         .collect();
@@ -34,9 +35,9 @@ fn explained(d: &Diagnosis) -> String {
     let gain = d.fit.as_ref().filter(fell).map_or(String::new(), |fit| {
         format!(
             " With it, the misfit on data the fit has not seen falls from {} to {} ng, against noise of {} ng.",
-            figure(norm(fit.held_out.before_rms_ng)),
-            figure(norm(fit.held_out.after_rms_ng)),
-            figure(norm(fit.noise_floor_ng))
+            short(norm(fit.held_out.before_rms_ng)),
+            short(norm(fit.held_out.after_rms_ng)),
+            short(norm(fit.noise_floor_ng))
         )
     });
     let why = d.effects.first().map_or(String::new(), |e| format!(" {}", e.why.trim()));
@@ -68,13 +69,8 @@ fn unexplained(d: &Diagnosis) -> String {
     )
 }
 
-/// An id in words.
-pub fn words(id: &str) -> String {
-    id.replace('_', " ")
-}
-
 /// A number with two significant digits, no exponent.
-pub fn figure(x: f64) -> String {
+pub fn short(x: f64) -> String {
     match x.abs() {
         a if a >= 100.0 => format!("{x:.0}"),
         a if a >= 10.0 => format!("{x:.1}"),
@@ -87,9 +83,15 @@ fn norm(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-fn lower_first(name: &str) -> String {
+/// A name inside a sentence: its first letter small, unless that stands alone and is a symbol.
+pub fn lower_first(name: &str) -> String {
     let mut letters = name.chars();
-    letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
+    match (letters.next(), letters.as_str()) {
+        (Some(first), rest) if rest.starts_with(char::is_lowercase) => {
+            first.to_lowercase().chain(rest.chars()).collect()
+        }
+        _ => name.to_owned(),
+    }
 }
 
 fn listed(items: &[String], last: &str) -> String {

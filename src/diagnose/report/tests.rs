@@ -91,7 +91,7 @@ fn plates(claimed: bool) -> Plates {
 #[test]
 fn the_page_of_a_finding_holds_its_numbers_and_all_figures() {
     let report = report(&diagnosis(Verdict::Explained), &plates(true));
-    let names: Vec<&str> = report.figures.iter().map(|f| f.0).collect();
+    let names: Vec<&str> = report.figures.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["residual.svg", "after.svg", "covariates.svg", "spectrum.svg", "ladder.svg"]);
     for needed in
         ["a &lt;case&gt;", "14210", "660", "61.4", "alternate 6 h blocks", "bias step", "solar radiation pressure"]
@@ -105,7 +105,7 @@ fn the_page_of_a_finding_holds_its_numbers_and_all_figures() {
 #[test]
 fn a_consistent_record_has_no_figure_of_what_is_left() {
     let report = report(&diagnosis(Verdict::Consistent), &plates(false));
-    assert!(!report.figures.iter().any(|f| f.0 == "after.svg"));
+    assert!(!report.figures.iter().any(|(name, _)| name == "after.svg"));
     assert!(report.html.contains("agrees with the simulation"));
     assert!(report.html.contains("below 3.10 ng rms"));
 }

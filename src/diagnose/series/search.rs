@@ -7,6 +7,7 @@ use super::follow::{Equation, Follows, equation};
 use super::read::{Axis, Series};
 use super::red::{self, Beat};
 use crate::diagnose::measured::{MeasuredCase, MeasuredError};
+use crate::math::rms::rms;
 
 /// Evidence needed to claim an effect, over red noise. A second gate follows: it must predict blocks that the fit has not
 /// seen. Of 1,000 series of red noise of any memory none passes both (`series::tests`); rarer false alarms are not shown.
@@ -41,7 +42,7 @@ pub struct Regression {
 impl Regression {
     /// Rms of what stays.
     pub fn rms(&self) -> f64 {
-        (self.residuals.iter().map(|v| v * v).sum::<f64>() / self.residuals.len().max(1) as f64).sqrt()
+        rms(&self.residuals)
     }
 }
 

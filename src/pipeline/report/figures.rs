@@ -1,38 +1,11 @@
 //! The figures, as SVG texts: grey for what was measured, one colour for what is fitted, bands for two standard errors.
 
-use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use super::plates::{Biases, Dot, History, Plates};
+use crate::paper::Drawn;
+use crate::paper::drawing::{BLUE, Canvas, Chart, GREY, INK, RED, WIDTH, mesh, on_canvas, said};
 use crate::telemetry::{Axis, Range};
-
-type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<String, String>;
-
-const WIDTH: u32 = 980;
-const GREY: RGBColor = RGBColor(140, 140, 140);
-const INK: RGBColor = RGBColor(40, 40, 40);
-const FITTED: RGBColor = RGBColor(38, 84, 124);
-const LEFT_OUT: RGBColor = RGBColor(178, 58, 46);
-
-fn text(size: u32) -> TextStyle<'static> {
-    TextStyle::from(("Helvetica, Arial, sans-serif", size).into_font()).color(&INK)
-}
-
-fn said(error: impl std::fmt::Display) -> String {
-    error.to_string()
-}
-
-fn on_canvas(height: u32, draw: impl FnOnce(&Canvas) -> Result<(), String>) -> Drawn {
-    let mut svg = String::new();
-    {
-        let canvas = SVGBackend::with_string(&mut svg, (WIDTH, height)).into_drawing_area();
-        canvas.fill(&WHITE).map_err(said)?;
-        draw(&canvas)?;
-        canvas.present().map_err(said)?;
-    }
-    Ok(svg)
-}
 
 /// Digits so that five labels over a span differ.
 fn digits(span: f64) -> usize {
@@ -47,12 +20,6 @@ struct Panel<'p> {
     time_below: bool,
 }
 
-type Chart<'a, 'b> = ChartContext<
-    'a,
-    SVGBackend<'b>,
-    Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
->;
-
 fn chart<'a, 'b>(area: &'a Canvas<'b>, panel: &Panel<'_>) -> Result<Chart<'a, 'b>, String> {
     let [low, high] = panel.y;
     let mut chart = ChartBuilder::on(area)
@@ -65,16 +32,11 @@ fn chart<'a, 'b>(area: &'a Canvas<'b>, panel: &Panel<'_>) -> Result<Chart<'a, 'b
     let decimals = digits(high - low).saturating_sub(1);
     // Rounding leaves no negative zero.
     let label = move |y: &f64| format!("{:.decimals$}", if y.abs() < 1e-9 { 0.0 } else { *y });
-    let mut mesh = chart.configure_mesh();
+    let mut mesh = mesh(&mut chart);
     mesh.disable_x_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(GREY.mix(0.25))
-        .axis_style(GREY)
         .x_labels(if panel.time_below { 8 } else { 0 })
         .y_labels(5)
         .y_desc(panel.name)
-        .axis_desc_style(text(13))
-        .label_style(text(12))
         .y_label_formatter(&label);
     if panel.time_below {
         mesh.x_desc("hours since lift-off").x_label_formatter(&|x| format!("{x:.0}"));
@@ -124,7 +86,7 @@ fn dots<'d>(chart: &mut Chart<'_, '_>, all: impl Iterator<Item = &'d Dot> + Clon
     let edge = 0.02 * (y[1] - y[0]);
     let not_used = all
         .filter(|d| !d.used)
-        .map(|d| Cross::new((d.met_h, d.value.clamp(y[0] + edge, y[1] - edge)), 4, LEFT_OUT.stroke_width(2)));
+        .map(|d| Cross::new((d.met_h, d.value.clamp(y[0] + edge, y[1] - edge)), 4, RED.stroke_width(2)));
     chart.draw_series(not_used).map_err(said)?;
     Ok(())
 }
@@ -138,7 +100,7 @@ pub fn bias(plates: &Plates, biases: &Biases) -> Drawn {
         for (row, area) in canvas.split_evenly((3, 1)).iter().enumerate() {
             let plate = &biases.axes[row];
             let letter = Axis::ALL[row].letter().to_uppercase();
-            let (wide, narrow) = area.split_horizontally(560);
+            let (wide, narrow) = area.split_horizontally(WIDTH * 4 / 7);
             let y = widest(span(plate.measured.iter(), false), span(plate.fitted.iter(), false));
             let name = format!("{letter}, counts");
             let mut drawn = chart(&wide, &Panel { x: plates.span_h, y, name: &name, time_below: row == 2 })?;
@@ -148,15 +110,15 @@ pub fn bias(plates: &Plates, biases: &Biases) -> Drawn {
                 .map(|d| (d.met_h, (d.value + 2.0 * d.sigma).clamp(y[0], y[1])))
                 .chain(plate.fitted.iter().rev().map(|d| (d.met_h, (d.value - 2.0 * d.sigma).clamp(y[0], y[1]))))
                 .collect();
-            drawn.draw_series([Polygon::new(band, FITTED.mix(0.18))]).map_err(said)?;
+            drawn.draw_series([Polygon::new(band, BLUE.mix(0.18))]).map_err(said)?;
             let line = plate.fitted.iter().map(|d| (d.met_h, d.value.clamp(y[0], y[1])));
-            drawn.draw_series(LineSeries::new(line, FITTED.stroke_width(1))).map_err(said)?;
+            drawn.draw_series(LineSeries::new(line, BLUE.stroke_width(1))).map_err(said)?;
             dots(&mut drawn, plate.measured.iter(), y)?;
             let y = span(plate.left.iter(), true);
             let panel = Panel { x: plates.span_h, y, name: "measured - fitted", time_below: row == 2 };
             let mut drawn = chart(&narrow, &panel)?;
             let zero = [(plates.span_h[0], 0.0), (plates.span_h[1], 0.0)];
-            drawn.draw_series(LineSeries::new(zero, FITTED.stroke_width(1))).map_err(said)?;
+            drawn.draw_series(LineSeries::new(zero, BLUE.stroke_width(1))).map_err(said)?;
             dots(&mut drawn, plate.left.iter(), y)?;
         }
         Ok(())
@@ -184,11 +146,11 @@ pub fn scale(plates: &Plates) -> Drawn {
             let at = |value: f64| value.clamp(y[0], y[1]);
             let band = Rectangle::new(
                 [(plates.span_h[0], at(mean - 2.0 * sigma)), (plates.span_h[1], at(mean + 2.0 * sigma))],
-                FITTED.mix(0.18).filled(),
+                BLUE.mix(0.18).filled(),
             );
             drawn.draw_series([band]).map_err(said)?;
             let line = [(plates.span_h[0], at(mean)), (plates.span_h[1], at(mean))];
-            drawn.draw_series(LineSeries::new(line, FITTED.stroke_width(1))).map_err(said)?;
+            drawn.draw_series(LineSeries::new(line, BLUE.stroke_width(1))).map_err(said)?;
             dots(&mut drawn, found.iter(), y)?;
         }
         Ok(())
@@ -209,7 +171,7 @@ pub fn history(history: &History) -> Drawn {
                 outline.extend(run.iter().rev().map(|p| (p[0], at(p[1]))));
                 drawn.draw_series([Polygon::new(outline, GREY.mix(0.35))]).map_err(said)?;
                 let line = run.iter().map(|p| (p[0], at(p[2])));
-                drawn.draw_series(LineSeries::new(line, FITTED.stroke_width(1))).map_err(said)?;
+                drawn.draw_series(LineSeries::new(line, BLUE.stroke_width(1))).map_err(said)?;
             }
         }
         let of = history.temperature.iter().map(|p| p.1);

@@ -10,22 +10,21 @@ use serde_json::{Value, json};
 use super::calibration::accuracy::{SYSTEMATIC_NG, published};
 use super::calibration_file::accuracy_json;
 use super::station::Station;
+use crate::paper::{Drawn, Figures, Report};
 
 /// The report of a mission.
 #[derive(Debug, Clone)]
-pub struct Report {
-    /// `index.html`.
-    pub html: String,
-    /// Name and SVG text of each figure.
-    pub figures: Vec<(String, String)>,
+pub struct MissionReport {
+    /// On paper.
+    pub paper: Report,
     /// `accuracy.json`: the tables for machines.
     pub accuracy: Value,
 }
 
 /// Draws the report. A figure that cannot be drawn is left out and named on the page.
-pub fn report(station: &Station) -> Report {
+pub fn report(station: &Station) -> MissionReport {
     let plates = plates::Plates::of(station);
-    let mut drawn: Vec<(String, Result<String, String>)> = Vec::new();
+    let mut drawn: Vec<(String, Drawn)> = Vec::new();
     for bias in &plates.biases {
         drawn.push((format!("bias_{}.svg", bias.range.letter().to_lowercase()), figures::bias(&plates, bias)));
     }
@@ -33,15 +32,7 @@ pub fn report(station: &Station) -> Report {
     for n in 0..plates.histories.len() {
         drawn.push((format!("history_{:02}.svg", n + 1), figures::history(&plates.histories[n])));
     }
-    let mut figures = Vec::new();
-    let mut missing = Vec::new();
-    for (name, svg) in drawn {
-        match svg {
-            Ok(svg) if !svg.is_empty() => figures.push((name, svg)),
-            Ok(_) => {}
-            Err(reason) => missing.push(format!("{name}: {reason}")),
-        }
-    }
+    let figures = Figures::of(drawn);
     let accuracy = json!({
         "axes": accuracy_json(station.derived()),
         "systematic_ng": SYSTEMATIC_NG,
@@ -51,6 +42,6 @@ pub fn report(station: &Station) -> Report {
             "quiet_statistical_ng": published::STS62_QUIET_STATISTICAL_NG,
         },
     });
-    let html = page::page(station, &plates, &figures, &missing);
-    Report { html, figures, accuracy }
+    let html = page::page(station, &plates, &figures);
+    MissionReport { paper: Report { html, figures: figures.shown }, accuracy }
 }

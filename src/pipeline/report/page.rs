@@ -3,49 +3,22 @@
 use std::fmt::Write;
 
 use super::plates::Plates;
+use crate::paper::Figures;
+use crate::paper::page::{self, close, escaped, figure, open, table, words};
 use crate::pipeline::calibration::accuracy::{AxisAccuracy, published, quadrature, statistical_error};
 use crate::pipeline::calibration::{Bias, Derived};
 use crate::pipeline::station::Station;
 use crate::telemetry::{Axis, Range};
 
-const STYLE: &str = "
-:root { --ink: #222; --soft: #666; --rule: #d5d5d5; --claim: #b23a2e; }
-* { box-sizing: border-box; }
-body { font: 15px/1.5 Georgia, 'Times New Roman', serif; color: var(--ink); max-width: 1020px; margin: 2.2em auto; padding: 0 1.2em; }
-h1 { font-size: 1.55em; font-weight: normal; margin: 0 0 .1em; }
-h2 { font-size: 1.1em; margin: 2em 0 .5em; border-bottom: 1px solid var(--rule); padding-bottom: .2em; }
-p { margin: .5em 0; max-width: 48em; }
-.under { color: var(--soft); margin: 0 0 1.2em; }
-table { border-collapse: collapse; margin: .6em 0 1em; font: 13.5px/1.45 Helvetica, Arial, sans-serif; font-variant-numeric: tabular-nums; }
-caption { text-align: left; color: var(--soft); padding-bottom: .3em; }
-th { text-align: left; font-weight: bold; border-bottom: 1.5px solid var(--ink); padding: .2em 1.2em .2em 0; vertical-align: bottom; }
-td { border-bottom: 1px solid var(--rule); padding: .22em 1.2em .22em 0; vertical-align: top; }
-td.n, th.n { text-align: right; white-space: nowrap; }
-td.t, th.t { white-space: nowrap; }
-figure { margin: 1em 0 1.4em; page-break-inside: avoid; break-inside: avoid; }
-figure svg { width: 100%; height: auto; display: block; }
-figcaption { color: var(--soft); font-size: .9em; max-width: 52em; }
-footer { margin-top: 3em; border-top: 1px solid var(--rule); color: var(--soft); font-size: .85em; }
-@page { size: A4; margin: 16mm 15mm; }
-@media print {
-  body { font-size: 10.5pt; max-width: none; margin: 0; padding: 0; }
-  h2 { break-after: avoid; } tr { break-inside: avoid; }
-  table { font-size: 8.5pt; }
-}
-";
+/// What this page has beside the common style: its tables are long and wide.
+const MORE: &str =
+    "td.n, th.n { white-space: nowrap; } @media print { table { font-size: 8.5pt; break-inside: auto; } }";
 
 /// The whole page.
-pub fn page(station: &Station, plates: &Plates, figures: &[(String, String)], missing: &[String]) -> String {
-    let mut page = String::new();
-    let mission = escaped(&station.settings().mission);
-    let _ = write!(
-        page,
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-         <title>Mission {mission}: calibration and accelerations</title><style>{STYLE}</style></head>\n<body>\n\
-         <h1>Mission {mission}: calibration and accelerations</h1>\n<p class=\"under\">{}</p>\n",
-        escaped(&under(station, plates))
-    );
+pub fn page(station: &Station, plates: &Plates, Figures { shown: figures, missing }: &Figures) -> String {
+    let title = format!("Mission {}: calibration and accelerations", station.settings().mission);
+    let mut page = open(&title, &title, MORE, "");
+    let _ = writeln!(page, "<p class=\"under\">{}</p>", escaped(&under(station, plates)));
     let derived = station.derived();
     accuracy(&mut page, derived);
     anomalies(&mut page, station);
@@ -78,10 +51,10 @@ pub fn page(station: &Station, plates: &Plates, figures: &[(String, String)], mi
     if !missing.is_empty() {
         let _ = writeln!(page, "<p>Figures that could not be drawn: {}</p>", escaped(&missing.join("; ")));
     }
-    page.push_str(
-        "<footer><p>a = (counts - bias) SF<sub>N</sub> SF<sub>C</sub>. Errors are one standard error. Body axes: X tail to nose, Y \
-         starboard, Z through the belly; 1 ng is 9.80665e-9 m/s&sup2;. Published figures: J. E. Rice, NASA CR-198552 (1996).</p></footer>\n\
-         </body></html>\n",
+    close(
+        &mut page,
+        "a = (counts - bias) SF<sub>N</sub> SF<sub>C</sub>. Errors are one standard error. Body axes: X tail to nose, Y starboard, Z \
+         through the belly; 1 ng is 9.80665e-9 m/s&sup2;. Published figures: J. E. Rice, NASA CR-198552 (1996).",
     );
     page
 }
@@ -190,7 +163,7 @@ fn anomalies(page: &mut String, station: &Station) {
     let time = station.settings().time;
     let rows = found.iter().map(|a| {
         vec![
-            a.kind.word().replace('_', " "),
+            words(a.kind.word()),
             format!("{:.2} to {:.2}", time.met_h(a.from.seconds()), time.met_h(a.to.seconds())),
             with_error(a.value, a.sigma) + " " + a.unit,
             a.sentence.clone(),
@@ -245,9 +218,9 @@ fn scales(page: &mut String, station: &Station, figures: &[(String, String)]) {
             vec![
                 format!("{} {}", capital(axis), range.letter()),
                 with_error(scale.correction, scale.sigma),
-                scale.provenance.word().replace('_', " "),
+                words(scale.provenance.word()),
                 format!("{used} of {}", of().count()),
-                refused.join(", ").replace('_', " "),
+                words(&refused.join(", ")),
             ]
         })
     });
@@ -287,61 +260,10 @@ fn corrections(page: &mut String, derived: &Derived) {
     let _ = writeln!(page, "<p>{}</p>", escaped(&text));
 }
 
-fn figure(page: &mut String, figures: &[(String, String)], name: &str, caption: &str) {
-    let Some((_, svg)) = figures.iter().find(|(n, _)| n == name) else { return };
-    let _ = writeln!(page, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
-}
-
-/// A heading that begins with `#` stands over numbers, one with `~` over words that stay on one line.
-fn class(heading: Option<&&str>) -> &'static str {
-    match heading.and_then(|heading| heading.chars().next()) {
-        Some('#') => " class=\"n\"",
-        Some('~') => " class=\"t\"",
-        _ => "",
-    }
-}
-
-fn table(page: &mut String, caption: &str, head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) {
-    page.push_str("<table>");
-    if !caption.is_empty() {
-        let _ = write!(page, "<caption>{}</caption>", escaped(caption));
-    }
-    page.push_str("<thead><tr>");
-    for (k, cell) in head.iter().enumerate() {
-        let _ = write!(page, "<th{}>{}</th>", class(head.get(k)), escaped(cell.trim_start_matches(['#', '~'])));
-    }
-    page.push_str("</tr></thead><tbody>");
-    for row in rows {
-        page.push_str("<tr>");
-        for (k, cell) in row.iter().enumerate() {
-            let _ = write!(page, "<td{}>{}</td>", class(head.get(k)), escaped(cell));
-        }
-        page.push_str("</tr>");
-    }
-    page.push_str("</tbody></table>\n");
-}
-
-/// Value and error, to the error's second digit.
+/// Value and error in one cell.
 fn with_error(value: f64, sigma: f64) -> String {
-    if !(sigma > 0.0) || !sigma.is_finite() {
-        return format!("{value:.3}").trim_end_matches('0').trim_end_matches('.').to_string();
-    }
-    let digits = (1.0 - sigma.log10().floor()).clamp(0.0, 7.0) as usize;
-    format!("{value:.digits$} ± {sigma:.digits$}")
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn errors_have_two_digits_and_values_as_many() {
-        assert_eq!(with_error(-2241.73, 3.264), "-2241.7 ± 3.3");
-        assert_eq!(with_error(1.07213, 0.00041), "1.07213 ± 0.00041");
-        assert_eq!(with_error(1.0, 0.0), "1");
+    match page::with_error(value, sigma) {
+        (value, error) if error.is_empty() => value,
+        (value, error) => format!("{value} ± {error}"),
     }
 }

@@ -4,13 +4,17 @@
 //! at hand. Sets grow from nothing in a beam, are refined in their nonlinear parameters, and are then weighed each with
 //! the noise fitted to its own residual: slow noise and a slow effect compete on equal terms. It decides nothing.
 
+mod refine;
+mod weigh;
+
 use nalgebra::{DMatrix, DVector};
+
+pub use refine::refine;
+pub use weigh::{Weighed, fit_noise, residual, weigh_with_own_noise};
 
 use super::catalogue::{Effect, Shape, Theta};
 use super::design::{Chosen, Column, Frame};
-use super::noise::{self, AxisNoise};
 use super::open_form::Atom;
-use super::optimise::nelder_mead;
 use super::scene::{Axes, Scene};
 
 /// Effects in a set at most.
@@ -341,174 +345,4 @@ pub fn grow(frame: &Frame, bank: &Bank, allowed: &[usize], seeds: Vec<Set>, size
     }
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
     found
-}
-
-/// Refine the nonlinear parameters of a set at one noise, and weigh it with the volume of their posterior.
-pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
-    for i in 0..set.members.len() {
-        let entry = &entries[set.members[i].entry];
-        let Some(effect) = entry.effect() else { continue };
-        let free: Vec<usize> = (0..effect.nonlinear.len()).filter(|j| effect.nonlinear[*j].step > 0.0).collect();
-        if free.is_empty() {
-            continue;
-        }
-        let others = Set {
-            members: set.members.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, m)| m.clone()).collect(),
-            score: 0.0,
-        };
-        let chosen = others.chosen(frame);
-        let mut theta = set.members[i].theta;
-        let scale = set.members[i].scale;
-        let gain = |theta: &Theta| -> f64 {
-            let Some(shape) = (effect.signature)(scene, theta) else { return f64::NEG_INFINITY };
-            let point = whiten(frame, *theta, &shape, &entry.sizes, scale);
-            if point.fixed { chosen.gain_fixed(&point.columns[0]) } else { chosen.gain(&point.columns) }
-        };
-        let start: Vec<f64> = free.iter().map(|j| theta[*j]).collect();
-        let steps: Vec<f64> = free.iter().map(|j| effect.nonlinear[*j].step).collect();
-        let place = |p: &[f64]| {
-            let mut t = theta;
-            free.iter().zip(p).for_each(|(j, x)| t[*j] = *x);
-            t
-        };
-        let before = gain(&theta);
-        let best = nelder_mead(&start, &steps, 60, |p| -gain(&place(p)));
-        let refined = place(&best);
-        let peak = gain(&refined);
-        if peak >= before {
-            theta = refined;
-        }
-        let peak = peak.max(before);
-        if !peak.is_finite() {
-            continue;
-        }
-        let (log_occam, sigma) = volume(&gain, &theta, &free, effect, entry.log_volume, peak);
-        if let Some(point) = point_at(scene, frame, entry, &set.members[i], &theta) {
-            let m = &mut set.members[i];
-            let log_occam = log_occam - (entry.scales().len() as f64).ln();
-            (m.theta, m.log_occam, m.theta_sigma, m.point) = (theta, log_occam, sigma, point);
-        }
-    }
-    set.weigh(frame, entries);
-}
-
-/// Laplace volume of the nonlinear parameters around their peak against their prior's, and their standard errors.
-fn volume(
-    gain: &impl Fn(&Theta) -> f64,
-    theta: &Theta,
-    free: &[usize],
-    effect: &Effect,
-    log_volume: f64,
-    peak: f64,
-) -> (f64, Theta) {
-    let n = free.len();
-    let mut h: Vec<f64> = free.iter().map(|j| effect.nonlinear[*j].step * 0.1).collect();
-    // A wall on one side (a lag cannot be negative) is mirrored: the fall is counted on the open side.
-    let gain = |t: &Theta| {
-        let there = gain(t);
-        if there.is_finite() {
-            return there;
-        }
-        gain(&[2.0 * theta[0] - t[0], 2.0 * theta[1] - t[1]])
-    };
-    // Steps at which the evidence falls by about one half: neither rounding nor the far side.
-    for (a, j) in free.iter().enumerate() {
-        for _ in 0..14 {
-            let at = |sign: f64| {
-                let mut t = *theta;
-                t[*j] += sign * h[a];
-                gain(&t)
-            };
-            let drop = peak - 0.5 * (at(1.0) + at(-1.0));
-            if !drop.is_finite() || drop > 1.5 {
-                h[a] *= 0.6;
-            } else if drop < 0.25 {
-                h[a] *= 1.5;
-            } else {
-                break;
-            }
-        }
-    }
-    let at = |shifts: &[(usize, f64)]| {
-        let mut t = *theta;
-        shifts.iter().for_each(|(a, s)| t[free[*a]] += s * h[*a]);
-        gain(&t)
-    };
-    let mut hessian = DMatrix::zeros(n, n);
-    for a in 0..n {
-        hessian[(a, a)] = (2.0 * peak - at(&[(a, 1.0)]) - at(&[(a, -1.0)])).clamp(0.05, 1e6) / (h[a] * h[a]);
-        for b in 0..a {
-            let mixed = (at(&[(a, 1.0), (b, -1.0)]) + at(&[(a, -1.0), (b, 1.0)])
-                - at(&[(a, 1.0), (b, 1.0)])
-                - at(&[(a, -1.0), (b, -1.0)]))
-                / (4.0 * h[a] * h[b]);
-            let bound = 0.95 * (hessian[(a, a)] * hessian[(b, b)]).sqrt();
-            let mixed = if mixed.is_finite() { mixed.clamp(-bound, bound) } else { 0.0 };
-            hessian[(a, b)] = mixed;
-            hessian[(b, a)] = mixed;
-        }
-    }
-    let mut sigma = [0.0; 2];
-    let Some(inverse) = hessian.clone().try_inverse() else { return (0.0, sigma) };
-    for (a, j) in free.iter().enumerate() {
-        sigma[*j] = inverse[(a, a)].max(0.0).sqrt();
-    }
-    let log_laplace = 0.5 * (n as f64 * std::f64::consts::TAU.ln() - hessian.determinant().max(1e-300).ln());
-    ((log_laplace - log_volume).min(0.0), sigma)
-}
-
-/// A set with the noise fitted to what it leaves.
-pub struct Weighed {
-    /// The set, refined at its own noise.
-    pub set: Set,
-    /// Noise of its residual.
-    pub noise: [AxisNoise; 3],
-    /// Log posterior, up to a constant common to all sets of a case.
-    pub log_posterior: f64,
-}
-
-/// Residual of a set at the noise of a frame.
-pub fn residual(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) -> Axes {
-    let mut left = scene.residual_ng.clone();
-    for part in set.contributions(scene, frame, entries) {
-        for (total, series) in left.iter_mut().zip(&part) {
-            total.iter_mut().zip(series).for_each(|(t, x)| *t -= x);
-        }
-    }
-    left
-}
-
-/// Fit the noise of all axes to a residual.
-pub fn fit_noise(
-    scene: &Scene,
-    residual_ng: &Axes,
-    start: Option<&[AxisNoise; 3]>,
-    evaluations: usize,
-) -> [AxisNoise; 3] {
-    std::array::from_fn(|k| {
-        noise::fit(&residual_ng[k], &scene.schedule, &scene.activity[k], start.map(|s| &s[k]), evaluations).noise
-    })
-}
-
-/// Weigh a set with its own noise: alternately noise and coefficients, `rounds` times.
-pub fn weigh_with_own_noise(
-    scene: &Scene,
-    entries: &[Entry],
-    set: &Set,
-    start: &[AxisNoise; 3],
-    rounds: usize,
-    evaluations: usize,
-) -> Weighed {
-    let mut noise = *start;
-    let mut set = set.clone();
-    let mut frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
-    set.rewhiten(scene, &frame, entries);
-    for _ in 0..rounds {
-        noise = fit_noise(scene, &residual(scene, &frame, entries, &set), Some(&noise), evaluations);
-        frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
-        set.rewhiten(scene, &frame, entries);
-    }
-    refine(scene, &frame, entries, &mut set);
-    let log_posterior = frame.log_null + set.score + noise.iter().map(noise::log_prior).sum::<f64>();
-    Weighed { set, noise, log_posterior }
 }

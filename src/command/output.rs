@@ -1,0 +1,22 @@
+//! Files that commands leave behind; what could not be written is told with its path.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use oare_ground::paper::Report;
+
+/// Writes a file; its folder is made if need be.
+pub fn write(path: &Path, text: &str) -> Result<()> {
+    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    }
+    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Writes a report: `index.html`, its figures, and one JSON document beside them.
+pub fn write_report(folder: &Path, report: &Report, (json_name, json): (&str, &str)) -> Result<()> {
+    write(&folder.join("index.html"), &report.html)?;
+    write(&folder.join(json_name), json)?;
+    report.figures.iter().try_for_each(|(name, svg)| write(&folder.join(name), svg))
+}

@@ -1,0 +1,46 @@
+//! Whether the numbers of a case can be in the units they should be in: by the size of the middle one.
+
+use super::{Ancillary, Recording, Simulation, WINDOWS_MIN};
+use crate::diagnose::error::CaseError;
+
+/// Columns of accelerations.
+const ACCELERATION: [&str; 3] = ["ax_ng", "ay_ng", "az_ng"];
+
+/// A recording: long enough, and in nano-g.
+pub fn recording(file: &str, recording: &Recording) -> Result<(), CaseError> {
+    if recording.clock_s.len() < WINDOWS_MIN {
+        return Err(CaseError::TooFew { file: file.into(), found: recording.clock_s.len(), needed: WINDOWS_MIN });
+    }
+    for k in 0..3 {
+        typical(file, ACCELERATION[k], &recording.a_ng[k], "ng", 1e-2, 1e7)?;
+        typical(file, ["dev_x_ng", "dev_y_ng", "dev_z_ng"][k], &recording.dev_ng[k], "ng", 1e-3, 1e7)?;
+    }
+    Ok(())
+}
+
+/// A simulation: in nano-g.
+pub fn simulation(file: &str, simulation: &Simulation) -> Result<(), CaseError> {
+    (0..3).try_for_each(|k| typical(file, ACCELERATION[k], &simulation.a_ng[k], "ng", 1e-6, 1e7))
+}
+
+/// Orbit, attitude and environment: SI, degrees Celsius, unit quaternions.
+pub fn ancillary(file: &str, ancillary: &Ancillary) -> Result<(), CaseError> {
+    let norm = |v: &[[f64; 3]]| v.iter().map(|x| x.iter().map(|c| c * c).sum::<f64>().sqrt()).collect::<Vec<f64>>();
+    typical(file, "rx_m, ry_m, rz_m", &norm(&ancillary.r_m), "m", 6.4e6, 5e7)?;
+    typical(file, "vx_m_s, vy_m_s, vz_m_s", &norm(&ancillary.v_m_s), "m/s", 5e2, 1.2e4)?;
+    typical(file, "wx_rad_s, wy_rad_s, wz_rad_s", &norm(&ancillary.w_rad_s), "rad/s", 0.0, 1.0)?;
+    typical(file, "density_kg_m3", &ancillary.density_kg_m3, "kg/m3", 0.0, 1e-6)?;
+    typical(file, "temperature_c", &ancillary.temperature_c, "C", 0.0, 500.0)?;
+    let q: Vec<f64> = ancillary.q.iter().map(|q| q.iter().map(|c| c * c).sum::<f64>().sqrt()).collect();
+    typical(file, "qw, qx, qy, qz (norm)", &q, "1, the norm", 0.99, 1.01)
+}
+
+fn typical(file: &str, column: &str, values: &[f64], unit: &'static str, low: f64, high: f64) -> Result<(), CaseError> {
+    let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let found = sizes[sizes.len() / 2];
+    if found < low || found > high {
+        return Err(CaseError::Unit { file: file.into(), column: column.into(), found, unit, low, high });
+    }
+    Ok(())
+}

@@ -1,0 +1,178 @@
+//! `case.toml`, read and checked.
+
+use jiff::Timestamp;
+
+use super::one_line;
+use crate::diagnose::error::CaseError;
+
+/// `case.toml`, checked. What other kinds add stays in `table`.
+#[derive(Debug, Clone)]
+pub struct Header {
+    /// The case's id.
+    pub id: String,
+    /// UTC at instrument clock 0.
+    pub epoch_utc: Timestamp,
+    /// Lift-off, instrument clock.
+    pub liftoff_clock_s: f64,
+    /// Span asked for, instrument clock.
+    pub span_s: [f64; 2],
+    /// The vehicle.
+    pub vehicle: Vehicle,
+    /// Physics the simulation claims to include: tested, not believed.
+    pub includes: Vec<String>,
+    /// Kind of recording.
+    pub kind: String,
+    /// File names: recording, simulation, ancillary, events.
+    pub files: Files,
+    /// Everything `case.toml` said.
+    pub table: toml::Table,
+}
+
+/// Names of the files of a case, as `case.toml` gives them; empty where it gives none.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Files {
+    /// Recording.
+    pub recording: String,
+    /// Simulation.
+    pub simulation: String,
+    /// Ancillary data.
+    pub ancillary: String,
+    /// Mission log.
+    pub events: String,
+}
+
+/// The vehicle as the simulation knows it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Vehicle {
+    /// Mass.
+    pub mass_kg: f64,
+    /// Drag coefficient.
+    pub drag_coefficient: f64,
+    /// Projected area along body X, Y, Z.
+    pub area_m2: [f64; 3],
+    /// Sensor from the centre of gravity, body axes.
+    pub sensor_offset_m: [f64; 3],
+    /// Solar radiation coefficient.
+    pub srp_coefficient: f64,
+}
+
+impl Header {
+    /// Parse `case.toml`; `set` are `key=value` overrides of dotted keys.
+    pub fn parse(text: &str, set: &[String]) -> Result<Self, CaseError> {
+        let mut table: toml::Table =
+            text.parse().map_err(|e: toml::de::Error| CaseError::Toml(one_line(&e.to_string())))?;
+        for item in set {
+            override_key(&mut table, item)?;
+        }
+        let kind = string(&table, "recording.kind")?;
+        let vehicle = Vehicle {
+            mass_kg: number_or(&table, "vehicle.mass_kg", 104_000.0)?,
+            drag_coefficient: number_or(&table, "vehicle.drag_coefficient", 2.2)?,
+            area_m2: triple_or(&table, "vehicle.area_m2", [64.1, 255.0, 367.0])?,
+            sensor_offset_m: triple_or(&table, "vehicle.sensor_offset_m", [0.0; 3])?,
+            srp_coefficient: number_or(&table, "vehicle.srp_coefficient", 1.3)?,
+        };
+        let epoch = string(&table, "case.epoch_utc")
+            .or_else(|e| if kind == "acceleration_csv" { Err(e) } else { Ok("1970-01-01T00:00:00Z".into()) })?;
+        let epoch_utc = epoch.parse().map_err(|_| CaseError::Key {
+            key: "case.epoch_utc".into(),
+            expected: "a UTC time such as 1994-07-08T12:53:01Z",
+            found: epoch,
+        })?;
+        if vehicle.mass_kg <= 0.0 {
+            return Err(CaseError::Key {
+                key: "vehicle.mass_kg".into(),
+                expected: "positive",
+                found: vehicle.mass_kg.to_string(),
+            });
+        }
+        Ok(Self {
+            id: string(&table, "case.id")?,
+            epoch_utc,
+            liftoff_clock_s: number_or(&table, "case.liftoff_clock_s", 0.0)?,
+            span_s: [
+                number_or(&table, "case.start_s", f64::NEG_INFINITY)?,
+                number_or(&table, "case.end_s", f64::INFINITY)?,
+            ],
+            vehicle,
+            includes: words(&table, "simulation.includes"),
+            kind,
+            files: Files {
+                recording: string(&table, "recording.file").unwrap_or_default(),
+                simulation: string(&table, "simulation.file").unwrap_or_default(),
+                ancillary: string(&table, "ancillary.file").unwrap_or_default(),
+                events: string(&table, "ancillary.events").unwrap_or_default(),
+            },
+            table,
+        })
+    }
+
+    /// Unix time of an instrument clock.
+    pub fn unix_s(&self, clock_s: f64) -> f64 {
+        self.epoch_utc.as_millisecond() as f64 / 1000.0 + clock_s
+    }
+}
+
+fn lookup<'a>(table: &'a toml::Table, key: &str) -> Option<&'a toml::Value> {
+    let mut parts = key.split('.');
+    let mut value = table.get(parts.next()?)?;
+    for part in parts {
+        value = value.as_table()?.get(part)?;
+    }
+    Some(value)
+}
+
+fn wrong(key: &str, expected: &'static str, found: Option<&toml::Value>) -> CaseError {
+    CaseError::Key { key: key.into(), expected, found: found.map_or("nothing".to_string(), |v| v.to_string()) }
+}
+
+fn string(table: &toml::Table, key: &str) -> Result<String, CaseError> {
+    let value = lookup(table, key);
+    value.and_then(|v| v.as_str()).map(str::to_string).ok_or_else(|| wrong(key, "a text", value))
+}
+
+fn number(value: &toml::Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|i| i as f64)).filter(|x| x.is_finite())
+}
+
+fn number_or(table: &toml::Table, key: &str, default: f64) -> Result<f64, CaseError> {
+    match lookup(table, key) {
+        None => Ok(default),
+        Some(value) => number(value).ok_or_else(|| wrong(key, "a finite number", Some(value))),
+    }
+}
+
+fn triple_or(table: &toml::Table, key: &str, default: [f64; 3]) -> Result<[f64; 3], CaseError> {
+    let Some(value) = lookup(table, key) else { return Ok(default) };
+    let numbers: Option<Vec<f64>> = value.as_array().and_then(|a| a.iter().map(number).collect());
+    numbers.and_then(|n| n.try_into().ok()).ok_or_else(|| wrong(key, "three finite numbers", Some(value)))
+}
+
+fn words(table: &toml::Table, key: &str) -> Vec<String> {
+    lookup(table, key)
+        .and_then(|v| v.as_array())
+        .map(|a| a.iter().filter_map(|v| v.as_str().map(str::to_string)).collect())
+        .unwrap_or_default()
+}
+
+fn override_key(table: &mut toml::Table, item: &str) -> Result<(), CaseError> {
+    let bad = || CaseError::Key { key: item.into(), expected: "key=value", found: item.into() };
+    let (key, value) = item.split_once('=').ok_or_else(bad)?;
+    let value: toml::Value = format!("v = {value}")
+        .parse::<toml::Table>()
+        .ok()
+        .and_then(|mut t| t.remove("v"))
+        .unwrap_or_else(|| toml::Value::String(value.into()));
+    let mut parts: Vec<&str> = key.trim().split('.').collect();
+    let last = parts.pop().ok_or_else(bad)?;
+    let mut place = table;
+    for part in parts {
+        place = place
+            .entry(part)
+            .or_insert_with(|| toml::Value::Table(toml::Table::new()))
+            .as_table_mut()
+            .ok_or_else(bad)?;
+    }
+    place.insert(last.into(), value);
+    Ok(())
+}

@@ -1,0 +1,275 @@
+//! A case, read from its texts and checked. Not here: files (the command reads them), and what other kinds of recording hold.
+
+mod check;
+mod header;
+mod read;
+
+use std::ops::Deref;
+use std::sync::Arc;
+
+pub use header::{Files, Header, Vehicle};
+
+use super::error::CaseError;
+
+/// Windows a recording must have in common with its simulation, fewer say nothing about the noise.
+pub const WINDOWS_MIN: usize = 200;
+/// Half of the window the recorder averages over, s.
+pub const HALF_WINDOW_S: f64 = 25.0;
+/// From the centre of one window to that of the next, s.
+pub const WINDOW_STRIDE_S: f64 = 25.0;
+
+/// The texts of the files a case names.
+#[derive(Debug, Clone, Default)]
+pub struct Texts {
+    /// `recording.csv`.
+    pub recording: Option<String>,
+    /// `simulation.csv`.
+    pub simulation: Option<String>,
+    /// `ancillary.csv`.
+    pub ancillary: Option<String>,
+    /// `events.csv`; a case without a log is allowed.
+    pub events: Option<String>,
+}
+
+/// Calibrated windows.
+#[derive(Debug, Clone, Default)]
+pub struct Recording {
+    /// Window centres, increasing.
+    pub clock_s: Vec<f64>,
+    /// Acceleration in body axes, one vector per axis.
+    pub a_ng: [Vec<f64>; 3],
+    /// Average deviation in the window.
+    pub dev_ng: [Vec<f64>; 3],
+}
+
+/// What the baseline simulation expects, instantaneous.
+#[derive(Debug, Clone, Default)]
+pub struct Simulation {
+    /// Grid, increasing.
+    pub clock_s: Vec<f64>,
+    /// Acceleration in body axes, one vector per axis.
+    pub a_ng: [Vec<f64>; 3],
+}
+
+/// Orbit, attitude and environment on their grid.
+#[derive(Debug, Clone, Default)]
+pub struct Ancillary {
+    /// Grid, increasing.
+    pub clock_s: Vec<f64>,
+    /// Inertial position (true equator of date).
+    pub r_m: Vec<[f64; 3]>,
+    /// Inertial velocity.
+    pub v_m_s: Vec<[f64; 3]>,
+    /// Body from inertial, scalar first.
+    pub q: Vec<[f64; 4]>,
+    /// Inertial rate in body axes.
+    pub w_rad_s: Vec<[f64; 3]>,
+    /// Density the simulation used.
+    pub density_kg_m3: Vec<f64>,
+    /// Sensor temperature.
+    pub temperature_c: Vec<f64>,
+}
+
+/// One entry of the mission log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Event {
+    /// Start, instrument clock.
+    pub clock_s: f64,
+    /// Duration.
+    pub duration_s: f64,
+    /// Kind.
+    pub kind: String,
+    /// Anything.
+    pub detail: String,
+}
+
+/// What a recording is compared with, checked: a case that lacks its recording.
+#[derive(Debug, Clone)]
+pub struct Expectation {
+    /// `case.toml`.
+    pub header: Header,
+    /// The simulation.
+    pub simulation: Simulation,
+    /// The ancillary data.
+    pub ancillary: Ancillary,
+    /// The mission log, in order of time.
+    pub events: Vec<Event>,
+}
+
+/// A checked `acceleration_csv` case: every window lies inside simulation and ancillary data.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// What the recording is compared with.
+    pub expected: Arc<Expectation>,
+    /// The recording.
+    pub recording: Recording,
+    /// Windows left out because the simulation's grid is too coarse for its own signal there.
+    pub windows_too_rough: usize,
+}
+
+impl Deref for Case {
+    type Target = Expectation;
+
+    fn deref(&self) -> &Expectation {
+        &self.expected
+    }
+}
+
+impl Expectation {
+    /// From its parts, units checked.
+    ///
+    /// # Errors
+    /// The first unit that cannot be right.
+    pub fn new(
+        header: Header,
+        simulation: Simulation,
+        ancillary: Ancillary,
+        mut events: Vec<Event>,
+    ) -> Result<Self, CaseError> {
+        check::simulation(&header.files.simulation, &simulation)?;
+        check::ancillary(&header.files.ancillary, &ancillary)?;
+        events.sort_by(|a, b| a.clock_s.total_cmp(&b.clock_s));
+        Ok(Self { header, simulation, ancillary, events })
+    }
+
+    /// From the texts of its files, of which a recording is not one.
+    ///
+    /// # Errors
+    /// What is wrong with each of the files.
+    pub fn from_texts(header: Header, texts: &Texts) -> Result<Self, Vec<CaseError>> {
+        let files = &header.files;
+        let simulation = read::given(&files.simulation, &texts.simulation)
+            .and_then(|text| read::simulation(&files.simulation, text))
+            .and_then(|simulation| check::simulation(&files.simulation, &simulation).map(|()| simulation));
+        let ancillary = read::given(&files.ancillary, &texts.ancillary)
+            .and_then(|text| read::ancillary(&files.ancillary, text))
+            .and_then(|ancillary| check::ancillary(&files.ancillary, &ancillary).map(|()| ancillary));
+        let events = read::log(&files.events, &texts.events);
+        match (simulation, ancillary, events) {
+            (Ok(simulation), Ok(ancillary), Ok(events)) => {
+                Self::new(header, simulation, ancillary, events).map_err(|error| vec![error])
+            }
+            (simulation, ancillary, events) => {
+                Err([simulation.err(), ancillary.err(), events.err()].into_iter().flatten().collect())
+            }
+        }
+    }
+
+    /// Events of one kind as spans `[start_s, end_s]`.
+    pub fn spans(&self, kind: &str) -> Vec<[f64; 2]> {
+        self.events.iter().filter(|e| e.kind == kind).map(|e| [e.clock_s, e.clock_s + e.duration_s]).collect()
+    }
+}
+
+impl Case {
+    /// From the texts of its files.
+    pub fn from_texts(header: Header, texts: &Texts) -> Result<Self, CaseError> {
+        let name = header.files.recording.clone();
+        let recording = read::recording(&name, read::given(&name, &texts.recording)?)?;
+        let expected = Expectation::from_texts(header, texts).map_err(first)?;
+        Self::meet(Arc::new(expected), recording)
+    }
+
+    /// From its parts: units checked, and windows outside simulation, ancillary data or the span asked for left out.
+    pub fn new(
+        header: Header,
+        recording: Recording,
+        simulation: Simulation,
+        ancillary: Ancillary,
+        events: Vec<Event>,
+    ) -> Result<Self, CaseError> {
+        Self::meet(Arc::new(Expectation::new(header, simulation, ancillary, events)?), recording)
+    }
+
+    /// A recording and what it is compared with: its unit checked, and windows outside simulation, ancillary data or the span
+    /// asked for left out.
+    ///
+    /// # Errors
+    /// When the unit cannot be right, or too little is in common.
+    pub fn meet(expected: Arc<Expectation>, recording: Recording) -> Result<Self, CaseError> {
+        let files = &expected.header.files;
+        check::recording(&files.recording, &recording)?;
+        let common = |grid: &[f64]| [grid[0] + HALF_WINDOW_S, grid[grid.len() - 1] - HALF_WINDOW_S];
+        let mut kept = recording;
+        for (file, span) in [
+            ("case.toml", expected.header.span_s),
+            (&files.simulation, common(&expected.simulation.clock_s)),
+            (&files.ancillary, common(&expected.ancillary.clock_s)),
+        ] {
+            let [first, last] = [kept.clock_s[0], kept.clock_s[kept.clock_s.len() - 1]];
+            kept = within(&kept, span);
+            if kept.clock_s.len() < WINDOWS_MIN {
+                return Err(CaseError::NoOverlap {
+                    recording_start_s: first,
+                    recording_end_s: last,
+                    file: file.to_string(),
+                    start_s: span[0],
+                    end_s: span[1],
+                    common: kept.clock_s.len(),
+                    needed: WINDOWS_MIN,
+                });
+            }
+        }
+        let before = kept.clock_s.len();
+        let smooth = smooth_enough(&kept, &expected.simulation);
+        if smooth.clock_s.len() >= WINDOWS_MIN {
+            kept = smooth;
+        }
+        let windows_too_rough = before - kept.clock_s.len();
+        Ok(Self { expected, recording: kept, windows_too_rough })
+    }
+}
+
+fn first(mut errors: Vec<CaseError>) -> CaseError {
+    errors.swap_remove(0)
+}
+
+fn within(recording: &Recording, span: [f64; 2]) -> Recording {
+    let keep: Vec<usize> = (0..recording.clock_s.len())
+        .filter(|&i| recording.clock_s[i] >= span[0] && recording.clock_s[i] <= span[1])
+        .collect();
+    take(recording, &keep)
+}
+
+fn take(recording: &Recording, keep: &[usize]) -> Recording {
+    let pick = |v: &Vec<f64>| keep.iter().map(|&i| v[i]).collect::<Vec<f64>>();
+    Recording {
+        clock_s: pick(&recording.clock_s),
+        a_ng: std::array::from_fn(|k| pick(&recording.a_ng[k])),
+        dev_ng: std::array::from_fn(|k| pick(&recording.dev_ng[k])),
+    }
+}
+
+/// Share of the noise by which a straight line between grid points may miss the simulated signal.
+const ROUGHNESS_MAX: f64 = 0.3;
+
+/// The windows in which the simulation's grid resolves its own signal: between grid points it is known to about an eighth
+/// of the second difference, and where that is not small against the noise a comparison says nothing.
+fn smooth_enough(recording: &Recording, simulation: &Simulation) -> Recording {
+    let grid = &simulation.clock_s;
+    let noise: [f64; 3] = std::array::from_fn(|k| {
+        let mut steps: Vec<f64> = recording.a_ng[k].windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        steps.sort_by(f64::total_cmp);
+        steps[steps.len() / 2].max(1e-9)
+    });
+    let rough: Vec<bool> = (0..grid.len())
+        .map(|i| {
+            let [a, b] = [i.saturating_sub(1), (i + 1).min(grid.len() - 1)];
+            (0..3).any(|k| {
+                let m = &simulation.a_ng[k];
+                (m[a] - 2.0 * m[i] + m[b]).abs() / 8.0 > ROUGHNESS_MAX * noise[k]
+            })
+        })
+        .collect();
+    let touched = |t: f64| {
+        let first = grid.partition_point(|g| *g < t - HALF_WINDOW_S).saturating_sub(1);
+        let last = (grid.partition_point(|g| *g < t + HALF_WINDOW_S) + 1).min(grid.len());
+        rough[first..last].iter().any(|r| *r)
+    };
+    let keep: Vec<usize> = (0..recording.clock_s.len()).filter(|i| !touched(recording.clock_s[*i])).collect();
+    take(recording, &keep)
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,146 @@
+//! The CSV files of a case, by the names of their columns.
+
+use super::{Ancillary, Event, Recording, Simulation, WINDOWS_MIN, one_line};
+use crate::diagnose::error::CaseError;
+
+/// The text of a file the case names.
+pub fn given<'a>(file: &str, text: &'a Option<String>) -> Result<&'a str, CaseError> {
+    text.as_deref().ok_or_else(|| CaseError::MissingFile { file: file.to_string() })
+}
+
+/// The mission log; none where the case names none.
+pub fn log(file: &str, text: &Option<String>) -> Result<Vec<Event>, CaseError> {
+    match text {
+        Some(text) => events(file, text),
+        None if file.is_empty() => Ok(Vec::new()),
+        None => Err(CaseError::MissingFile { file: file.to_string() }),
+    }
+}
+
+/// Columns of a CSV by name, every cell a finite number.
+fn columns(file: &str, text: &str, names: &[&str]) -> Result<Vec<Vec<f64>>, CaseError> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let csv_error = |e: csv::Error| CaseError::Csv { file: file.into(), reason: one_line(&e.to_string()) };
+    let header = reader.headers().map_err(csv_error)?.clone();
+    let places = names.iter().map(|name| {
+        header.iter().position(|h| h == *name).ok_or_else(|| CaseError::MissingColumn {
+            file: file.into(),
+            column: name.to_string(),
+            found: header.iter().collect::<Vec<_>>().join(", "),
+        })
+    });
+    let places = places.collect::<Result<Vec<usize>, _>>()?;
+    let mut out = vec![Vec::new(); names.len()];
+    for (row, record) in reader.records().enumerate() {
+        let record = record.map_err(csv_error)?;
+        for ((place, name), column) in places.iter().zip(names).zip(&mut out) {
+            let cell = &record[*place];
+            match cell.parse::<f64>() {
+                Ok(value) if value.is_finite() => column.push(value),
+                _ => {
+                    return Err(CaseError::NotANumber {
+                        file: file.into(),
+                        line: row + 2,
+                        column: name.to_string(),
+                        found: cell.into(),
+                    });
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+fn increasing(file: &str, clock_s: &[f64], needed: usize) -> Result<(), CaseError> {
+    if clock_s.len() < needed {
+        return Err(CaseError::TooFew { file: file.into(), found: clock_s.len(), needed });
+    }
+    match clock_s.windows(2).position(|w| w[1] <= w[0]) {
+        Some(i) => {
+            Err(CaseError::TimeOrder { file: file.into(), line: i + 3, found: clock_s[i + 1], before: clock_s[i] })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Windows of a recording.
+pub fn recording(file: &str, text: &str) -> Result<Recording, CaseError> {
+    let [clock_s, ax, ay, az, dx, dy, dz] =
+        fixed(columns(file, text, &["clock_s", "ax_ng", "ay_ng", "az_ng", "dev_x_ng", "dev_y_ng", "dev_z_ng"])?);
+    increasing(file, &clock_s, WINDOWS_MIN)?;
+    Ok(Recording { clock_s, a_ng: [ax, ay, az], dev_ng: [dx, dy, dz] })
+}
+
+/// What a simulation expects.
+pub fn simulation(file: &str, text: &str) -> Result<Simulation, CaseError> {
+    let [clock_s, ax, ay, az] = fixed(columns(file, text, &["clock_s", "ax_ng", "ay_ng", "az_ng"])?);
+    increasing(file, &clock_s, 2)?;
+    Ok(Simulation { clock_s, a_ng: [ax, ay, az] })
+}
+
+/// Orbit, attitude and environment.
+pub fn ancillary(file: &str, text: &str) -> Result<Ancillary, CaseError> {
+    let names = [
+        "clock_s",
+        "rx_m",
+        "ry_m",
+        "rz_m",
+        "vx_m_s",
+        "vy_m_s",
+        "vz_m_s",
+        "qw",
+        "qx",
+        "qy",
+        "qz",
+        "wx_rad_s",
+        "wy_rad_s",
+        "wz_rad_s",
+        "density_kg_m3",
+        "temperature_c",
+    ];
+    let c = columns(file, text, &names)?;
+    increasing(file, &c[0], 2)?;
+    let rows = 0..c[0].len();
+    let vector =
+        |first: usize| rows.clone().map(|i| std::array::from_fn(|k| c[first + k][i])).collect::<Vec<[f64; 3]>>();
+    let q = rows.clone().map(|i| std::array::from_fn(|k| c[7 + k][i])).collect();
+    Ok(Ancillary {
+        clock_s: c[0].clone(),
+        r_m: vector(1),
+        v_m_s: vector(4),
+        q,
+        w_rad_s: vector(11),
+        density_kg_m3: c[14].clone(),
+        temperature_c: c[15].clone(),
+    })
+}
+
+fn events(file: &str, text: &str) -> Result<Vec<Event>, CaseError> {
+    let c = columns(file, text, &["clock_s", "duration_s"])?;
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let csv_error = |e: csv::Error| CaseError::Csv { file: file.into(), reason: one_line(&e.to_string()) };
+    let header = reader.headers().map_err(csv_error)?.clone();
+    let place = |name: &str| header.iter().position(|h| h == name);
+    let kind = place("kind").ok_or_else(|| CaseError::MissingColumn {
+        file: file.into(),
+        column: "kind".into(),
+        found: header.iter().collect::<Vec<_>>().join(", "),
+    })?;
+    let detail = place("detail");
+    let mut events = Vec::new();
+    for (i, record) in reader.records().enumerate() {
+        let record = record.map_err(csv_error)?;
+        events.push(Event {
+            clock_s: c[0][i],
+            duration_s: c[1][i].max(0.0),
+            kind: record[kind].to_string(),
+            detail: detail.and_then(|d| record.get(d)).unwrap_or_default().to_string(),
+        });
+    }
+    Ok(events)
+}
+
+fn fixed<const N: usize>(columns: Vec<Vec<f64>>) -> [Vec<f64>; N] {
+    let mut columns = columns.into_iter();
+    std::array::from_fn(|_| columns.next().unwrap_or_default())
+}

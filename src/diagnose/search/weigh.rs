@@ -1,0 +1,62 @@
+//! A set and the noise, fitted to what the set leaves: slow noise and a slow effect compete on equal terms.
+
+use super::{Entry, Set, refine};
+use crate::diagnose::design::Frame;
+use crate::diagnose::noise::{self, AxisNoise};
+use crate::diagnose::scene::{Axes, Scene};
+
+/// A set with the noise fitted to what it leaves.
+pub struct Weighed {
+    /// The set, refined at its own noise.
+    pub set: Set,
+    /// Noise of its residual.
+    pub noise: [AxisNoise; 3],
+    /// Log posterior, up to a constant common to all sets of a case.
+    pub log_posterior: f64,
+}
+
+/// Residual of a set at the noise of a frame.
+pub fn residual(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) -> Axes {
+    let mut left = scene.residual_ng.clone();
+    for part in set.contributions(scene, frame, entries) {
+        for (total, series) in left.iter_mut().zip(&part) {
+            total.iter_mut().zip(series).for_each(|(t, x)| *t -= x);
+        }
+    }
+    left
+}
+
+/// Fit the noise of all axes to a residual.
+pub fn fit_noise(
+    scene: &Scene,
+    residual_ng: &Axes,
+    start: Option<&[AxisNoise; 3]>,
+    evaluations: usize,
+) -> [AxisNoise; 3] {
+    std::array::from_fn(|k| {
+        noise::fit(&residual_ng[k], &scene.schedule, &scene.activity[k], start.map(|s| &s[k]), evaluations).noise
+    })
+}
+
+/// Weigh a set with its own noise: alternately noise and coefficients, `rounds` times.
+pub fn weigh_with_own_noise(
+    scene: &Scene,
+    entries: &[Entry],
+    set: &Set,
+    start: &[AxisNoise; 3],
+    rounds: usize,
+    evaluations: usize,
+) -> Weighed {
+    let mut noise = *start;
+    let mut set = set.clone();
+    let mut frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    set.rewhiten(scene, &frame, entries);
+    for _ in 0..rounds {
+        noise = fit_noise(scene, &residual(scene, &frame, entries, &set), Some(&noise), evaluations);
+        frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+        set.rewhiten(scene, &frame, entries);
+    }
+    refine(scene, &frame, entries, &mut set);
+    let log_posterior = frame.log_null + set.score + noise.iter().map(noise::log_prior).sum::<f64>();
+    Weighed { set, noise, log_posterior }
+}

@@ -1,0 +1,78 @@
+//! Which sets can be believed, and the simplest of those that are as good.
+
+use super::effect_of;
+use crate::diagnose::catalogue::WHOLE;
+use crate::diagnose::design::Frame;
+use crate::diagnose::scene::Scene;
+use crate::diagnose::search::{Set, Weighed};
+use crate::diagnose::solve::Library;
+
+/// Log odds within which another set is as good, and the smaller of two nested sets is preferred.
+pub const EQUAL: f64 = 2.3;
+
+/// Listed sets whose sizes can be believed; the others are refused, with the reason.
+pub fn credible<'a>(
+    scene: &Scene,
+    library: &Library,
+    sets: &'a [Weighed],
+    notes: &mut Vec<String>,
+) -> Vec<&'a Weighed> {
+    let mut kept = Vec::new();
+    for w in sets {
+        let frame = Frame::new(&w.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+        let mut set = w.set.clone();
+        set.rewhiten(scene, &frame, &library.entries);
+        let (mean, covariance) = set.coefficients(&frame, &library.entries);
+        let mut next = 0;
+        let mut reason = None;
+        for (i, m) in set.members.iter().enumerate() {
+            let Some(effect) = effect_of(&library.entries, &set, i) else { continue };
+            for (k, l) in effect.linear.iter().enumerate().take(m.linear()) {
+                if mean[next + k].abs() > l.size_max {
+                    reason = Some(format!(
+                        "{} is refused: it would need {} = {:.3} {}, and {} is the most that can be believed",
+                        effect.id,
+                        l.name,
+                        mean[next + k],
+                        l.unit,
+                        l.size_max
+                    ));
+                }
+                let (fraction, doubt) = (mean[next + k], 2.0 * covariance[(next + k, next + k)].max(0.0).sqrt());
+                if l.whole && (fraction + doubt < WHOLE[0] || fraction - doubt > WHOLE[1]) {
+                    reason = Some(format!(
+                        "{} is refused: the term is left out or it is not, and {fraction:.2} of it is neither",
+                        effect.id
+                    ));
+                }
+            }
+            next += m.linear();
+        }
+        match reason {
+            None => kept.push(w),
+            Some(reason) if !notes.contains(&reason) && notes.len() < 3 => notes.push(reason),
+            Some(_) => {}
+        }
+    }
+    kept
+}
+
+/// The smallest set that is part of the best one and as good.
+pub fn simplest<'a>(listed: &[&'a Weighed]) -> &'a Weighed {
+    let best = listed[0];
+    let key = best.set.key();
+    let nested = |w: &&&Weighed| w.set.members.len() < key.len() && w.set.key().iter().all(|e| key.contains(e));
+    listed
+        .iter()
+        .filter(|w| best.log_posterior - w.log_posterior < EQUAL)
+        .filter(nested)
+        .min_by_key(|w| w.set.members.len())
+        .copied()
+        .unwrap_or(best)
+}
+
+/// Whether one set holds the other.
+pub fn is_nested(a: &Set, b: &Set) -> bool {
+    let (a, b) = (a.key(), b.key());
+    a.iter().all(|e| b.contains(e)) || b.iter().all(|e| a.contains(e))
+}

@@ -1,0 +1,74 @@
+//! How well it fits: before, after, on data held out, and how white what is left is.
+
+use crate::diagnose::answer::{Fit, FitLevel};
+use crate::diagnose::design::Frame;
+use crate::diagnose::model;
+use crate::diagnose::scene::{Axes, Scene};
+use crate::diagnose::search::{self, Set, Weighed};
+use crate::diagnose::solve::Library;
+use crate::math::rms::rms_about_mean;
+
+/// A remaining autocorrelation this unlikely makes the errors wider.
+const WHITENESS_P: f64 = 1e-3;
+
+/// Before and after, and by how much the errors must be widened.
+pub fn fit(
+    scene: &Scene,
+    library: &Library,
+    frame: &Frame,
+    weighed: &Weighed,
+    set: &Set,
+    notes: &mut Vec<String>,
+) -> (Fit, f64) {
+    let entries = &library.entries;
+    let left = search::residual(scene, frame, entries, set);
+    let after = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &left);
+    let dof = 3.0 * (scene.schedule.len() as f64 - 1.0);
+    let level = |axes: &Axes, f: &Frame, used: f64| FitLevel {
+        rms_ng: std::array::from_fn(|k| rms_about_mean(&axes[k])),
+        whitened_chi2_per_dof: f.data.dot(&f.data) / (dof - used),
+    };
+    let used: f64 = set.members.iter().map(|m| m.linear() as f64).sum();
+    let mut inflation = 1.0_f64;
+    for k in 0..3 {
+        let (p, ratio) = whiteness(&after.data.projected(k, &after));
+        if p < WHITENESS_P {
+            inflation = inflation.max(ratio.sqrt());
+            notes.push(format!(
+                "the whitened residual of axis {} is not white (p = {p:.1e}): errors are widened by {:.2}",
+                ["x", "y", "z"][k],
+                ratio.sqrt()
+            ));
+        }
+    }
+    let held_out = model::held_out(scene, frame, entries, set, &weighed.noise);
+    if !set.members.is_empty() && held_out.log_score_gain <= 0.0 {
+        notes.push("the fit does not predict blocks it has not seen".into());
+    }
+    let fit = Fit {
+        noise_floor_ng: std::array::from_fn(|k| weighed.noise[k].rms_ng()),
+        before: level(&scene.residual_ng, frame, 0.0),
+        after: level(&left, &after, used),
+        held_out,
+    };
+    (fit, inflation)
+}
+
+/// Ljung-Box over twenty lags: its p value, and the statistic against what is expected.
+fn whiteness(x: &[f64]) -> (f64, f64) {
+    const LAGS: usize = 20;
+    let n = x.len() as f64;
+    let energy: f64 = x.iter().map(|v| v * v).sum();
+    let q: f64 = (1..=LAGS)
+        .map(|lag| {
+            let r: f64 = x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum::<f64>() / energy;
+            r * r / (n - lag as f64)
+        })
+        .sum::<f64>()
+        * n
+        * (n + 2.0);
+    // Wilson and Hilferty 1931: the cube root of a chi square is nearly normal.
+    let k = LAGS as f64;
+    let z = ((q / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
+    (0.5 * statrs::function::erf::erfc(z / std::f64::consts::SQRT_2), (q / k).max(1.0))
+}

@@ -1,0 +1,195 @@
+//! From weighed hypotheses to what is said: consistent, explained, ambiguous or unexplained, with its figures. It decides; what
+//! it says of a decision is in the files beside it.
+
+mod credible;
+mod fit;
+mod limits;
+mod named;
+mod unnamed;
+
+use self::credible::{credible, simplest};
+use self::fit::fit;
+use self::limits::upper_limits;
+use self::named::name;
+use self::unnamed::{hypothesis, of_remains};
+use super::answer::{Diagnosis, Located, Verdict};
+use super::catalogue::Effect;
+use super::design::Frame;
+use super::locate;
+use super::model::{self, MemberFit};
+use super::remains::{self, Remains};
+use super::scene::{Axes, Scene};
+use super::search::{self, Entry, Family, Set, Weighed};
+use super::solve::{Library, Solution};
+
+/// Log odds by which an open form must beat the best listed set.
+const OPEN_MARGIN: f64 = 3.0;
+/// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
+const EVIDENCE_SHARE: f64 = 0.8;
+/// What remains overturns an explanation when it has more than this share of the energy explained.
+const REMAINS_SHARE: f64 = 0.03;
+
+/// What the answer rests on.
+struct Best<'a> {
+    weighed: &'a Weighed,
+    frame: Frame,
+    set: Set,
+    fits: Vec<MemberFit>,
+    contributions: Vec<Axes>,
+}
+
+/// Names of a set, for people and for `cannot_tell_apart`.
+fn ids(library: &Library, set: &Set) -> Vec<String> {
+    set.members
+        .iter()
+        .map(|m| match library.entries[m.entry].family {
+            Family::Listed(effect) => effect.id.to_string(),
+            Family::Open(i) => library.atoms[i].forms[m.theta[0] as usize].formula.clone(),
+        })
+        .collect()
+}
+
+fn effect_of(entries: &[Entry], set: &Set, i: usize) -> Option<&'static Effect> {
+    match entries[set.members[i].entry].family {
+        Family::Listed(effect) => Some(effect),
+        Family::Open(_) => None,
+    }
+}
+
+/// The answer, the claimed series at the windows, and the ladder of evidence.
+pub fn conclude(
+    scene: &Scene,
+    library: &Library,
+    solution: &Solution,
+    probability: f64,
+    claim: f64,
+) -> (Diagnosis, Axes, Vec<(String, f64)>) {
+    let null = solution.null.log_posterior;
+    let mut ladder: Vec<(String, f64)> = solution
+        .listed
+        .iter()
+        .chain(&solution.open)
+        .map(|w| (ids(library, &w.set).join(" + "), w.log_posterior - null))
+        .collect();
+    ladder.push(("nothing".into(), 0.0));
+    ladder.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut notes = Vec::new();
+    if scene.case.windows_too_rough > 0 {
+        notes.push(format!(
+            "{} windows are left out: the simulation changes too fast there for its own grid",
+            scene.case.windows_too_rough
+        ));
+    }
+    let listed = credible(scene, library, &solution.listed, &mut notes);
+    let top = |sets: &[&Weighed]| sets.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior);
+    let open: Vec<&Weighed> = solution.open.iter().collect();
+    let refused = solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior) - top(&listed) > OPEN_MARGIN;
+    let open_wins = top(&open) - top(&listed).max(null) > OPEN_MARGIN;
+    let claimed = probability <= EVIDENCE_SHARE * claim
+        && top(&listed).max(top(&open)).max(solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior))
+            > null;
+    let verdict = match (claimed, open_wins || refused) {
+        (false, _) => Verdict::Consistent,
+        (true, true) => Verdict::Unexplained,
+        (true, false) => Verdict::Explained,
+    };
+    let chosen: Option<&Weighed> = match verdict {
+        Verdict::Consistent => None,
+        Verdict::Unexplained if open_wins => open.first().copied(),
+        Verdict::Unexplained => solution.listed.first(),
+        _ => Some(simplest(&listed)),
+    };
+    let (verdict, chosen, remains) = with_remains(scene, library, solution, (verdict, chosen), claim);
+    let least = remains.as_ref().map_or(1.0, |r| r.probability);
+    let overall = (probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
+    let mut answer = Diagnosis { verdict, ..Diagnosis::nothing(&scene.case.header.id, overall) };
+    answer.located.covariates =
+        locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
+    let null_frame = Frame::new(&solution.null.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let Some(weighed) = chosen else {
+        answer.notes = notes;
+        if let Some(r) = remains.filter(|_| verdict == Verdict::Unexplained) {
+            answer.located.axes.clone_from(&r.axes);
+            answer.hypothesis = Some(of_remains(&r, ""));
+        }
+        answer.upper_limits = upper_limits(scene, library, &null_frame, &Set::default());
+        answer.fit = Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), &mut answer.notes).0);
+        return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder);
+    };
+    let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let mut set = weighed.set.clone();
+    set.rewhiten(scene, &frame, &library.entries);
+    let (fit, inflation) = fit(scene, library, &frame, weighed, &set, &mut notes);
+    let fits = model::parameters(scene, &frame, &library.entries, &set, inflation);
+    let contributions = set.contributions(scene, &frame, &library.entries);
+    let best = Best { weighed, frame, set, fits, contributions };
+    answer.fit = Some(fit);
+    let signal = sum(scene, &best.contributions);
+    let covariates = std::mem::take(&mut answer.located.covariates);
+    answer.located = Located {
+        covariates,
+        per_orbit_lines: locate::lines(scene, &best.frame),
+        ..locate::of_signal(scene, &signal, why_here(&best))
+    };
+    answer.upper_limits = upper_limits(scene, library, &best.frame, &best.set);
+    match verdict {
+        Verdict::Unexplained => {
+            answer.hypothesis = Some(match remains.filter(|_| !open_wins && !refused) {
+                Some(r) => of_remains(&r, &format!(" It remains beside {}.", ids(library, &best.set).join(" + "))),
+                None => hypothesis(library, &best, &listed, open_wins),
+            });
+        }
+        _ => name(&mut answer, scene, library, &best, &listed),
+    }
+    answer.notes = notes;
+    (answer, signal, ladder)
+}
+
+/// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.
+fn with_remains<'a>(
+    scene: &Scene,
+    library: &Library,
+    solution: &'a Solution,
+    (verdict, chosen): (Verdict, Option<&'a Weighed>),
+    claim: f64,
+) -> (Verdict, Option<&'a Weighed>, Option<Remains>) {
+    let weighed = chosen.unwrap_or(&solution.null);
+    let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let mut set = weighed.set.clone();
+    set.rewhiten(scene, &frame, &library.entries);
+    let left = search::residual(scene, &frame, &library.entries, &set);
+    let after = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &left);
+    let whitened: Axes = std::array::from_fn(|k| after.data.projected(k, &after));
+    let remains = remains::strongest(scene.clock_s(), &whitened, weighed.noise.map(|n| n.rms_ng()));
+    let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
+    let overturns = remains
+        .as_ref()
+        .is_some_and(|r| r.probability <= (1.0 - EVIDENCE_SHARE) * claim && r.energy > REMAINS_SHARE * explained);
+    match verdict {
+        Verdict::Consistent | Verdict::Explained if overturns => (Verdict::Unexplained, chosen, remains),
+        Verdict::Explained => (verdict, chosen, None),
+        _ => (verdict, chosen, remains),
+    }
+}
+
+fn why_here(best: &Best) -> &'static str {
+    let onset = best.fits.iter().any(|f| f.parameters.iter().any(|p| p.name == "onset_s"));
+    if onset { "onset" } else { "largest part of the mismatch" }
+}
+
+fn covariate(library: &Library, entry: usize) -> String {
+    match library.entries[entry].family {
+        Family::Listed(effect) => effect.id.to_string(),
+        Family::Open(i) => library.atoms[i].covariate.to_string(),
+    }
+}
+
+fn sum(scene: &Scene, parts: &[Axes]) -> Axes {
+    let mut total: Axes = std::array::from_fn(|_| vec![0.0; scene.schedule.len()]);
+    for part in parts {
+        for (t, p) in total.iter_mut().zip(part) {
+            t.iter_mut().zip(p).for_each(|(a, b)| *a += b);
+        }
+    }
+    total
+}

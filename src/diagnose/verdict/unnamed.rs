@@ -1,0 +1,59 @@
+//! What is said of a mismatch that no effect explains: a description, not a cause.
+
+use super::{Best, ids};
+use crate::diagnose::answer::Hypothesis;
+use crate::diagnose::remains::Remains;
+use crate::diagnose::search::{Family, Weighed};
+use crate::diagnose::solve::Library;
+
+/// From what remains after the best explanation; `beside` names that.
+pub fn of_remains(r: &Remains, beside: &str) -> Hypothesis {
+    Hypothesis {
+        formula: r.form.clone(),
+        axis: r.axis.clone(),
+        unit: "ng".into(),
+        location: format!("{}.{beside}", r.location),
+    }
+}
+
+/// From the open forms that won, or from nothing where none did, with the listed sets that came near.
+pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins: bool) -> Hypothesis {
+    let near = |w: &&Weighed| {
+        format!(
+            "{} lacks {:.1} in log evidence",
+            ids(library, &w.set).join(" + "),
+            best.weighed.log_posterior - w.log_posterior
+        )
+    };
+    let fails = listed.iter().take(3).map(near).collect::<Vec<_>>().join("; ");
+    if !open_wins {
+        return Hypothesis {
+            formula: "none".into(),
+            axis: "x, y, z".into(),
+            unit: "ng".into(),
+            location: format!("No credible set of listed effects. {fails}"),
+        };
+    }
+    let mut formula = Vec::new();
+    let mut axis = Vec::new();
+    let mut location = Vec::new();
+    for (i, m) in best.set.members.iter().enumerate() {
+        let Family::Open(atom) = library.entries[m.entry].family else { continue };
+        let amplitudes: Vec<String> =
+            best.fits[i].parameters.iter().map(|p| format!("{:.1}({:.1})", p.value, p.sigma)).collect();
+        formula.push(format!(
+            "[{}] x {}, scaled to unit deviation",
+            amplitudes.join(", "),
+            library.atoms[atom].forms[m.theta[0] as usize].formula
+        ));
+        axis.push(m.axis.map_or("x, y, z", |a| ["x", "y", "z"][a]));
+        location.push(library.atoms[atom].location);
+    }
+    let failing = if fails.is_empty() { String::new() } else { format!(" Near catalogue effects fail: {fails}.") };
+    Hypothesis {
+        formula: formula.join(" + "),
+        axis: axis.join("; "),
+        unit: "ng".into(),
+        location: format!("It lives in {}.{failing}", location.join(" and ")),
+    }
+}
