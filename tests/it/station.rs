@@ -1,11 +1,16 @@
 //! The pipeline as a state machine: what a late, repeated or contradicting frame does.
 
+use std::collections::BTreeMap;
+
 use oare_ground::ingest::wire::packet::{Apid, PacketId, total_octets, write, write_idle};
 use oare_ground::ingest::wire::record::write_acc;
-use oare_ground::ingest::wire::{Arrival, FrameId, LinkConfig, Sense, Verdict, frame};
+use oare_ground::ingest::wire::{Arrival, FrameId, LinkConfig, PlaybackPart, PlaybackReader, Sense, Verdict, frame};
 use oare_ground::pipeline::calibration::KnownCalibration;
+use oare_ground::pipeline::product::Revision;
 use oare_ground::pipeline::station::replay;
 use oare_ground::pipeline::{Change, PlaybackId, Settings, Station, files};
+use oare_ground::simulate::recorder::{Framer, Packetiser, RecorderConfig, playbacks};
+use oare_ground::simulate::{Mission, MissionConfig};
 use oare_ground::telemetry::{AccRecord, Mode, Quality, Range, Step};
 use oare_ground::units::Clock;
 
@@ -110,6 +115,66 @@ fn a_late_frame_reopens_only_the_windows_it_touches() {
         .collect();
     assert_eq!(after.iter().map(|(start, _)| *start).collect::<Vec<_>>(), touched);
     assert!(after.iter().all(|(_, superseded)| *superseded));
+}
+
+/// Octets of a simulated mission as the recorder plays them.
+fn simulated(hours: f64) -> Vec<u8> {
+    let mission = Mission::new(MissionConfig::sts65(17, hours)).unwrap();
+    let link = LinkConfig::default();
+    let (mut packetiser, mut framer) = (Packetiser::default(), Framer::new(link, 1, 0));
+    let mut frames = Vec::new();
+    for second in mission.fly() {
+        for sent in &second.sent {
+            framer.push(&packetiser.packet(sent), |frame| frames.push(frame));
+        }
+    }
+    framer.finish(|frame| frames.push(frame));
+    playbacks(&frames, &link, &RecorderConfig::clean(), 17).into_iter().flat_map(|pass| pass.octets).collect()
+}
+
+/// A window that is not whole is told of when the next look finds nothing more of it: two of the looks below.
+const PATIENCE_TENTHS: i64 = 8000;
+
+#[test]
+fn what_is_told_of_windows_is_what_changed_and_no_more() {
+    let octets = simulated(10.0);
+    let mut station = Station::new(Settings::sts65(), None);
+    let mut told: BTreeMap<i64, Revision> = BTreeMap::new();
+    let (mut again, mut calibrations) = (0, 0);
+    for playback in [1, 2].map(PlaybackId) {
+        let mut reader = PlaybackReader::new(LinkConfig::default());
+        // A few hundred seconds between two looks.
+        for chunk in octets.chunks(1 << 15) {
+            reader.push(chunk, |part| match part {
+                PlaybackPart::Opened => station.open_playback(playback),
+                PlaybackPart::Arrival(arrival) => station.take(playback, &arrival),
+                PlaybackPart::Closed { bits } => station.close_playback(playback, bits),
+            });
+            let changes = station.settle();
+            calibrations += changes.iter().filter(|change| matches!(change, Change::Calibration { .. })).count();
+            for change in changes {
+                let Change::Window { product, supersedes } = change else { continue };
+                let start = product.start.tenths();
+                assert_eq!(playback, PlaybackId(1), "the second time nothing is new");
+                assert_eq!(supersedes, told.insert(start, product.revision), "the one told before");
+                assert_ne!(supersedes, Some(product.revision), "told of without a change");
+                again += usize::from(supersedes.is_some());
+            }
+            let last = station.windows().last().map(|window| window.start);
+            for product in station
+                .products()
+                .filter(|product| last.is_some_and(|last| product.start.plus_tenths(PATIENCE_TENTHS) < last))
+            {
+                assert_eq!(told.get(&product.start.tenths()), Some(&product.revision), "a change not told");
+            }
+        }
+        station.flush().iter().for_each(|change| {
+            if let Change::Window { product, .. } = change {
+                told.insert(product.start.tenths(), product.revision);
+            }
+        });
+    }
+    assert!(calibrations >= 2 && again > 500, "{calibrations} calibrations, {again} windows told of again");
 }
 
 #[test]

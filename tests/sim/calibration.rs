@@ -2,11 +2,13 @@
 //! `settling`: `cargo test --release --features slow --test sim -- --nocapture` flies a part of them, `OARE_SEEDS=all` before it the
 //! whole, `OARE_SEEDS=20` that many seeds.
 
+use std::collections::BTreeMap;
+
 use oare_ground::ingest::wire::{PlaybackPart, PlaybackReader};
 use oare_ground::pipeline::archive::Archive;
 use oare_ground::pipeline::calibration::{AnomalyKind, Derived, range_corrections_as_of};
 use oare_ground::pipeline::station::replay;
-use oare_ground::pipeline::{PlaybackId, Settings, Station};
+use oare_ground::pipeline::{PlaybackId, Product, Settings, Station};
 use oare_ground::simulate::{Fault, Mission, MissionConfig};
 use oare_ground::telemetry::{Axis, Quality, Range};
 use oare_ground::units::Clock;
@@ -27,6 +29,14 @@ fn station_of(name: &str) -> Option<Station> {
         reader.push(&dump, &mut take);
         reader.finish(&mut take);
     }))
+}
+
+/// True body-axis acceleration, ng, and whether the window is one of normal mode, by the start of the window.
+fn truth_of(name: &str) -> BTreeMap<i64, ([f64; 3], bool)> {
+    let path = shared_data(&format!("dumps/{name}.truth.csv")).expect("the dump is there, so is its truth");
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let rows = reader.deserialize::<(f64, f64, f64, f64, f64, u8)>();
+    rows.map(|row| row.map(|(start, x, y, z, _, normal)| (start as i64, ([x, y, z], normal == 1))).unwrap()).collect()
 }
 
 fn kinds(derived: &Derived) -> Vec<AnomalyKind> {
@@ -55,8 +65,23 @@ fn the_misreported_interval_of_the_defects_sample_is_found() {
     assert!((found.to.seconds() - 575_831.0).abs() <= 30.0, "{}", found.sentence);
     assert_eq!(found.axes, Axis::ALL);
     assert!(derived.range_corrections.iter().all(|c| c.reported == Range::C && c.actual == Range::A));
-    let corrected = station.products().filter(|p| p.quality.contains(Quality::RANGE_CORRECTED)).count();
-    assert!(corrected > 280, "{corrected}");
+    let corrected: Vec<&Product> =
+        station.products().filter(|p| p.quality.contains(Quality::RANGE_CORRECTED)).collect();
+    assert!(corrected.len() > 280, "{}", corrected.len());
+    // Their error bars hold: neighbours share half their samples, so that a share of these is worth that of half as many.
+    let truth = truth_of("defects-24h");
+    for axis in 0..3 {
+        let sigmas: Vec<f64> = corrected
+            .iter()
+            .filter_map(|product| {
+                let (found, (truth, normal)) = (product.acceleration?, truth.get(&(product.start.seconds() as i64))?);
+                normal.then(|| (found.trimmed_ng.0[axis] - truth[axis]) / found.sigma_ng.0[axis])
+            })
+            .collect();
+        let inside = sigmas.iter().filter(|z| z.abs() < 2.0).count() as f64 / sigmas.len() as f64;
+        println!("axis {axis}: {:.1} % of {} corrected windows inside two sigma", 100.0 * inside, sigmas.len());
+        assert!(sigmas.len() > 250 && inside > 0.9, "axis {axis}: {inside:.3} of {}", sigmas.len());
+    }
     let shift = derived.anomalies.iter().find(|a| a.kind == AnomalyKind::ElectronicShift).unwrap();
     assert!((shift.value - 150.0).abs() < 3.0 * shift.sigma, "{}", shift.sentence);
     let aborted = derived.anomalies.iter().filter(|a| a.kind == AnomalyKind::ScaleRecordDefect).count();

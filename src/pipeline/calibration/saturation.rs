@@ -3,7 +3,8 @@
 //! A jet or a bump drives range C to its rail for a moment, and within 5 s the instrument takes a coarser range: that is how
 //! it is meant to work, and the samples are flagged anyway. It is told as a saturation when it lasts for a second and is none of
 //! that: it outlasts autoranging, or happens in range A, or comes faster than the 1 Hz filter lets an overload rise. While the
-//! table turns, its own acceleration may hold an axis at the rail: then only the last of these counts.
+//! table turns, its own acceleration may hold an axis at the rail: then only the last of these counts, and only within a step of
+//! the calibration, since the next step's acceleration comes at once.
 
 use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 use crate::pipeline::archive::Archive;
@@ -48,7 +49,7 @@ pub fn find(archive: &Archive, windows: &Windows, corrections: &[RangeCorrection
     cells.sort_unstable();
     cells.dedup();
     let mut runs: Vec<Run> = Vec::new();
-    let mut last: [Option<(Clock, i16)>; 3] = [None; 3];
+    let mut last: [Option<Last>; 3] = [None; 3];
     for record in cells.into_iter().flat_map(|cell| archive.cell(cell)) {
         for axis in Axis::ALL {
             add(&mut runs, record, axis, &mut last[axis.index()]);
@@ -59,14 +60,23 @@ pub fn find(archive: &Archive, windows: &Windows, corrections: &[RangeCorrection
     found
 }
 
-fn add(runs: &mut Vec<Run>, record: &AccRecord, axis: Axis, last: &mut Option<(Clock, i16)>) {
+/// The sample before, and what the instrument was doing.
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    clock: Clock,
+    count: i16,
+    doing: (Mode, Step, u8, bool),
+}
+
+fn add(runs: &mut Vec<Run>, record: &AccRecord, axis: Axis, last: &mut Option<Last>) {
+    let doing = (record.mode, record.step, record.target, record.table_moving);
     for (n, sample) in record.counts.iter().enumerate() {
         let count = sample[axis.index()];
         let clock = record.clock.plus_tenths(n as i64);
         if AccRecord::is_at_rail(count) {
             let step = last
-                .filter(|(before, _)| clock.tenths() - before.tenths() == 1)
-                .map_or(0, |(_, before)| (i32::from(count) - i32::from(before)).abs());
+                .filter(|before| clock.tenths() - before.clock.tenths() == 1 && before.doing == doing)
+                .map_or(0, |before| (i32::from(count) - i32::from(before.count)).abs());
             let open = runs.iter_mut().rev().find(|run| run.axis == axis);
             match open {
                 Some(run) if clock.tenths() - run.to.tenths() < APART_TENTHS && run.mode == record.mode => {
@@ -86,7 +96,7 @@ fn add(runs: &mut Vec<Run>, record: &AccRecord, axis: Axis, last: &mut Option<(C
                 }),
             }
         }
-        *last = Some((clock, count));
+        *last = Some(Last { clock, count, doing });
     }
 }
 

@@ -18,6 +18,10 @@ const TAUS_S: [f64; 25] = [
 ];
 /// Means of one second are correlated: variance of a fit over that of independent seconds.
 const CORRELATION: f64 = 1.5;
+/// The same with Huber's loss of efficiency.
+const INFLATION: f64 = 1.1 * CORRELATION;
+/// Length of a position, s.
+const POSITION_S: f64 = 50.0;
 /// Residuals beyond so many scatters lose weight.
 const HUBER: f64 = 1.5;
 
@@ -30,6 +34,8 @@ pub struct Transient {
     pub amplitude_sigma: f64,
     /// tau, s.
     pub tau_s: f64,
+    /// Change of S tau with one standard error of tau, S following, counts s.
+    pub area_with_tau: f64,
     /// What it would leave in a measured bias, counts, and the error of that.
     pub skew_counts: [f64; 2],
     /// Positions it was found in.
@@ -44,9 +50,10 @@ impl Transient {
         self.amplitude_counts * (-t_s / self.tau_s).exp()
     }
 
-    /// Error it leaves in a two-position bias once taken away, counts: common to all measurements.
+    /// Error it leaves in a two-position bias once taken away, counts: common to all measurements. Half that of the transient's mean
+    /// over the position, from its amplitude at this tau and from tau.
     pub fn bias_sigma(&self) -> f64 {
-        0.5 * self.amplitude_sigma * self.tau_s / 50.0
+        0.5 * (self.amplitude_sigma * self.tau_s).hypot(self.area_with_tau) / POSITION_S
     }
 
     /// Whether there is one.
@@ -124,7 +131,7 @@ fn mean_amplitude(positions: &[Position], tau_s: f64) -> (f64, f64) {
         .iter()
         .map(|p| {
             let (s, variance, _) = p.amplitude(tau_s);
-            (s, variance * p.scatter.powi(2) * CORRELATION * 1.1)
+            (s, variance * p.scatter.powi(2) * INFLATION)
         })
         .collect();
     let weight: f64 = each.iter().map(|(_, v)| 1.0 / v).sum();
@@ -132,6 +139,15 @@ fn mean_amplitude(positions: &[Position], tau_s: f64) -> (f64, f64) {
     let chi2: f64 = each.iter().map(|(s, v)| (s - mean).powi(2) / v).sum();
     let reduced = if each.len() > 1 { chi2 / (each.len() - 1) as f64 } else { 1.0 };
     (mean, (reduced.max(1.0) / weight).sqrt())
+}
+
+/// The common time constant.
+#[derive(Debug, Clone, Copy)]
+struct Tau {
+    /// Of least misfit, s.
+    tau_s: f64,
+    /// Standard error of its logarithm.
+    ln_sigma: f64,
 }
 
 /// The transients of Y and Z in their common opposite positions, with one tau; None without a position.
@@ -142,16 +158,21 @@ pub fn find(holds: &[&Hold<'_>], law: &TrimLaw, samples_min: usize) -> Option<[T
         return None;
     }
     positions.as_mut_slice().iter_mut().flatten().for_each(|p| p.reweigh(6.0));
-    let tau_s = best_tau(&positions);
+    let Tau { tau_s, .. } = best_tau(&positions);
     positions.as_mut_slice().iter_mut().flatten().for_each(|p| p.reweigh(tau_s));
-    let tau_s = best_tau(&positions);
+    let Tau { tau_s, ln_sigma } = best_tau(&positions);
     let span = [holds[0].start(), holds[holds.len() - 1].last()];
     Some(std::array::from_fn(|n| {
         let (amplitude_counts, amplitude_sigma) = mean_amplitude(&positions[n], tau_s);
+        let area = |ln_step: f64| {
+            let tau_s = tau_s * ln_step.exp();
+            mean_amplitude(&positions[n], tau_s).0 * tau_s
+        };
         let mut transient = Transient {
             amplitude_counts,
             amplitude_sigma,
             tau_s,
+            area_with_tau: 0.5 * (area(ln_sigma) - area(-ln_sigma)),
             skew_counts: [0.0; 2],
             positions: positions[n].len(),
             span,
@@ -161,8 +182,9 @@ pub fn find(holds: &[&Hold<'_>], law: &TrimLaw, samples_min: usize) -> Option<[T
     }))
 }
 
-/// The tau of least misfit over all positions, between the trial values by a parabola.
-fn best_tau(positions: &[Vec<Position>; 2]) -> f64 {
+/// The tau of least misfit over all positions, between the trial values by a parabola; its error from how fast the misfit rises. At
+/// the end of the trial values the error is the step to the next one.
+fn best_tau(positions: &[Vec<Position>; 2]) -> Tau {
     let misfits = TAUS_S.map(|tau_s| {
         positions
             .iter()
@@ -173,14 +195,16 @@ fn best_tau(positions: &[Vec<Position>; 2]) -> f64 {
             .sum::<f64>()
     });
     let best = (0..TAUS_S.len()).min_by(|a, b| misfits[*a].total_cmp(&misfits[*b])).unwrap_or(0);
-    if best == 0 || best + 1 == TAUS_S.len() {
-        return TAUS_S[best];
+    let inner = best.clamp(1, TAUS_S.len() - 2);
+    let [x0, x1, x2] = [inner - 1, inner, inner + 1].map(|n| TAUS_S[n].ln());
+    let [y0, y1, y2] = [inner - 1, inner, inner + 1].map(|n| misfits[n]);
+    let (before, after) = ((y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1));
+    let curvature = (after - before) / (x2 - x0);
+    if best != inner || curvature <= 0.0 {
+        return Tau { tau_s: TAUS_S[best], ln_sigma: 0.5 * (x2 - x0) };
     }
-    let [x0, x1, x2] = [TAUS_S[best - 1].ln(), TAUS_S[best].ln(), TAUS_S[best + 1].ln()];
-    let [y0, y1, y2] = [misfits[best - 1], misfits[best], misfits[best + 1]];
-    let numerator = (x1 - x0).powi(2) * (y1 - y2) - (x1 - x2).powi(2) * (y1 - y0);
-    let denominator = (x1 - x0) * (y1 - y2) - (x1 - x2) * (y1 - y0);
-    if denominator.abs() < 1e-12 { TAUS_S[best] } else { (x1 - 0.5 * numerator / denominator).clamp(x0, x2).exp() }
+    let middle = 0.5 * (x0 + x1) - 0.5 * before / curvature;
+    Tau { tau_s: middle.clamp(x0, x2).exp(), ln_sigma: (INFLATION / curvature).sqrt() }
 }
 
 /// Half the difference that taking the transient away makes to the trimmed mean, and its error over positions.
