@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use oare_ground::pipeline::archive::Archive;
 use oare_ground::pipeline::calibration::bias_law::{Expectation, Point, fit};
 use oare_ground::pipeline::calibration::{self, Derived};
-use oare_ground::pipeline::window::{Windows, windows};
+use oare_ground::pipeline::window::{Window, Windows, windows};
 use oare_ground::pipeline::{Product, Settings, derive};
 use oare_ground::simulate::{Mission, MissionConfig};
 use oare_ground::telemetry::{Axis, Range};
@@ -36,11 +36,8 @@ impl Flown {
     }
 
     fn products(&self, derived: &Derived, settings: &Settings) -> Vec<Product> {
-        let current = derived.current();
-        self.windows
-            .values()
-            .map(|window| derive::product(window, current, &derived.range_corrections, &settings.window))
-            .collect()
+        let windows: Vec<&Window> = self.windows.values().map(Box::as_ref).collect();
+        derive::products(&windows, derived.current(), &derived.range_corrections, &settings.window)
     }
 }
 

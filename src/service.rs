@@ -20,6 +20,7 @@ use crate::hub::Hub;
 use crate::hub::desk::Desk;
 use crate::hub::status::{Board, Phase};
 use crate::ingest::listener::{self, QUEUED_READS_MAX, Rules};
+use crate::ingest::priority::{PRODUCTS_GIVE_WAY, SEARCHES_GIVE_WAY, give_way};
 use crate::ingest::raw_log::{RawLog, StoreError};
 use crate::ingest::writer::{SharedStation, StationSamples, Writer};
 use crate::pipeline::Station;
@@ -29,10 +30,6 @@ use diagnosing::{Diagnosing, Gate};
 
 /// HTTP requests under way have this long to end after the drain.
 const HTTP_PATIENCE: Duration = Duration::from_secs(5);
-/// Niceness of what makes products, and of the searches of the running diagnosis: with every processor busy, those who ask are
-/// answered first, then products are made, then searched.
-const PRODUCTS_GIVE_WAY: i32 = 5;
-const SEARCHES_GIVE_WAY: i32 = 10;
 
 /// Why the service did not start, or ended otherwise than it was asked to.
 #[derive(Debug, thiserror::Error)]
@@ -107,6 +104,7 @@ impl Service {
     /// As [`Service::start`].
     pub async fn start_gated(config: Config, gate: Gate) -> Result<Self, ServiceError> {
         let expected = checked(&config)?;
+        shared_work_gives_way();
         let ingest = bind(config.ingest.address, "dumps").await?;
         let http = bind(config.http.address, "HTTP").await?;
         let address_of = |listener: &TcpListener| listener.local_addr().map_err(ServiceError::Http);
@@ -262,24 +260,21 @@ fn start_recording(
     Ok((finish, in_background(PRODUCTS_GIVE_WAY, move || recorder.run(&runtime, &finished))))
 }
 
-/// A thread for work that lasts as long as the service and gives way, by so many steps of niceness, to those who answer.
-fn in_background<T: Send + 'static>(steps: i32, work: impl FnOnce() -> T + Send + 'static) -> JoinHandle<T> {
+/// A thread of this niceness for work that lasts as long as the service.
+fn in_background<T: Send + 'static>(niceness: i32, work: impl FnOnce() -> T + Send + 'static) -> JoinHandle<T> {
     tokio::task::spawn_blocking(move || {
-        give_way(steps);
+        give_way(niceness);
         work()
     })
 }
 
-/// Lowers the priority of this thread. Where the system has no priority of single threads, all are equal.
-#[cfg(target_os = "linux")]
-fn give_way(steps: i32) {
-    if let Err(error) = rustix::process::nice(steps) {
-        tracing::debug!(%error, "a thread keeps its priority");
+/// The threads that share the work of a calibration give way too. A pool that the process has already stays as it is.
+fn shared_work_gives_way() {
+    let pool = rayon::ThreadPoolBuilder::new().start_handler(|_| give_way(PRODUCTS_GIVE_WAY));
+    if let Err(error) = pool.build_global() {
+        tracing::debug!(%error, "the threads of shared work keep their priority");
     }
 }
-
-#[cfg(not(target_os = "linux"))]
-fn give_way(_steps: i32) {}
 
 async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, ServiceError> {
     joined(tokio::task::spawn_blocking(work).await)

@@ -1,6 +1,6 @@
 //! The dump port: connections in, parts of playbacks out to the one writer.
 //!
-//! It never writes to a sender. How a stream is cut into reads changes nothing. Not here: what is durable (see `raw_log`) and
+//! A connection is read by a task and decoded by a thread of its own that gives way to those who answer. It never writes to a sender. How a stream is cut into reads changes nothing. Not here: what is durable (see `raw_log`) and
 //! what the frames mean (see `pipeline`).
 
 use std::net::{IpAddr, SocketAddr};
@@ -10,10 +10,11 @@ use std::time::Duration;
 
 use tokio::io::AsyncReadExt;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{Semaphore, mpsc};
+use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
+use super::priority::{PRODUCTS_GIVE_WAY, give_way};
 use crate::hub::status::{Board, count};
 use crate::ingest::wire::LinkConfig;
 use crate::ingest::wire::playback::{PlaybackPart, PlaybackReader};
@@ -22,6 +23,8 @@ use crate::ingest::wire::playback::{PlaybackPart, PlaybackReader};
 const READ_OCTETS: usize = 64 << 10;
 /// Reads waiting for the writer, of all connections: with `READ_OCTETS` the bound of what is taken and not yet durable.
 pub const QUEUED_READS_MAX: usize = 64;
+/// Reads of one connection waiting to be decoded.
+const UNDECODED_READS_MAX: usize = 2;
 /// A drain is over for a sender that was silent for this long.
 const DRAIN_SILENCE: Duration = Duration::from_millis(200);
 
@@ -139,7 +142,15 @@ impl Connection {
         count(&counters.connections, 1);
         count(&counters.connections_open, 1);
         tracing::info!(connection = self.number, peer = %self.peer, "a sender is connected");
-        let mut reader = PlaybackReader::new(self.rules.link);
+        let (decoder, decoded) = match self.start_decoder() {
+            Ok(started) => started,
+            Err(error) => {
+                count(&counters.connections_refused, 1);
+                counters.connections_open.fetch_sub(1, Ordering::Relaxed);
+                tracing::warn!(connection = self.number, %error, "turned away: no thread can be had to decode it");
+                return;
+            }
+        };
         let mut octets = vec![0u8; READ_OCTETS];
         let mut drain_ends = None;
         let end = loop {
@@ -165,27 +176,51 @@ impl Connection {
                 Err(_) => break End::Idle,
             };
             count(&counters.octets_in, taken as u64);
-            let mut parts = Vec::new();
-            reader.push(&octets[..taken], |part| parts.push(part));
-            if !self.hand_on(parts).await {
+            // Waits for room: a sender is held back by what is not durable yet.
+            if decoder.send(octets[..taken].to_vec()).await.is_err() {
                 break End::Drained;
             }
             if drain_ends.is_some_and(|ends| tokio::time::Instant::now() >= ends) {
                 break End::Drained;
             }
         };
-        let mut parts = Vec::new();
-        reader.finish(|part| parts.push(part));
-        self.hand_on(parts).await;
+        drop(decoder);
+        let bits = decoded.await;
         if end == End::Idle {
             count(&counters.connections_idle, 1);
         }
         counters.connections_open.fetch_sub(1, Ordering::Relaxed);
-        tracing::info!(connection = self.number, ?end, bits = reader.received_bits(), "a sender is gone");
+        match bits {
+            Ok(bits) => tracing::info!(connection = self.number, ?end, bits, "a sender is gone"),
+            Err(_) => tracing::error!(connection = self.number, ?end, "decoding broke off"),
+        }
     }
 
-    /// Waits for room in the writer's queue: a sender is held back by what is not durable yet.
-    async fn hand_on(&self, parts: Vec<PlaybackPart>) -> bool {
-        parts.is_empty() || self.writer.send(Parts { connection: self.number, parts }).await.is_ok()
+    /// A thread that decodes what it is sent and hands it on to the writer, and the bits it had when there is no more.
+    fn start_decoder(&self) -> std::io::Result<(mpsc::Sender<Vec<u8>>, oneshot::Receiver<u64>)> {
+        let (reads, mut undecoded) = mpsc::channel::<Vec<u8>>(UNDECODED_READS_MAX);
+        let (done, decoded) = oneshot::channel();
+        let (connection, link, writer) = (self.number, self.rules.link, self.writer.clone());
+        let decode = move || {
+            give_way(PRODUCTS_GIVE_WAY);
+            let hand_on = |parts: Vec<PlaybackPart>| {
+                parts.is_empty() || writer.blocking_send(Parts { connection, parts }).is_ok()
+            };
+            let mut reader = PlaybackReader::new(link);
+            while let Some(octets) = undecoded.blocking_recv() {
+                let mut parts = Vec::new();
+                reader.push(&octets, |part| parts.push(part));
+                if !hand_on(parts) {
+                    break;
+                }
+            }
+            let mut parts = Vec::new();
+            reader.finish(|part| parts.push(part));
+            hand_on(parts);
+            // Nobody may be waiting any more.
+            let _ = done.send(reader.received_bits());
+        };
+        std::thread::Builder::new().name(format!("decode-{connection}")).spawn(decode)?;
+        Ok((reads, decoded))
     }
 }

@@ -3,6 +3,7 @@
 mod batch;
 pub mod listener;
 pub mod log_replay;
+pub mod priority;
 pub mod raw_log;
 pub mod wire;
 pub mod writer;

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use super::timeline::{Timed, Timeline};
 use crate::ingest::wire::Record;
-use crate::telemetry::{AccRecord, Event, Housekeeping, Mode, OnBoardEstimate, TableReport};
+use crate::telemetry::{AccRecord, Event, Housekeeping, OnBoardEstimate, TableReport};
 use crate::units::Clock;
 
 /// Tenths of a second in a cell: half a window.
@@ -96,11 +96,6 @@ impl Archive {
     /// Science records whose cell lies in `[from, to)`, in order; the first and last cells are given whole.
     pub fn records_between(&self, from: Clock, to: Clock) -> impl Iterator<Item = &AccRecord> {
         self.cells.range(cell_of(from)..=cell_of(to)).flat_map(|(_, cell)| cell)
-    }
-
-    /// Science records of bias and scale calibrations, in order.
-    pub fn calibration_records(&self) -> impl Iterator<Item = &AccRecord> {
-        self.records().filter(|record| matches!(record.mode, Mode::Bias | Mode::Scale))
     }
 
     /// Housekeeping, in order.

@@ -1,6 +1,7 @@
 //! A window and a calibration make a product.
 
 use rapidhash::v3::rapidhash_v3;
+use rayon::prelude::*;
 
 use super::axes::{OareVector, errors_to_body, to_body};
 use super::calibration::{Calibrated, Calibration, Measured, RangeCorrection};
@@ -54,6 +55,16 @@ pub fn product(
     };
     product.revision = revision(window, &product);
     product
+}
+
+/// The products of many windows, in their order.
+pub fn products(
+    windows: &[&Window],
+    calibration: Option<&Calibration>,
+    corrections: &[RangeCorrection],
+    policy: &WindowPolicy,
+) -> Vec<Product> {
+    windows.par_iter().map(|window| product(window, calibration, corrections, policy)).collect()
 }
 
 /// The range the sensor was in; a window at the edge of a correction holds samples of both.

@@ -28,13 +28,50 @@ pub enum Novelty {
 #[derive(Debug, Clone)]
 struct Variant {
     digest: FrameDigest,
-    playbacks: Vec<PlaybackId>,
+    playbacks: GroupId,
+}
+
+/// Number of a group of playbacks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct GroupId(u32);
+
+/// Groups of playbacks, each kept once: a hundred thousand frames are of a handful.
+#[derive(Debug, Default)]
+struct Groups {
+    members: Vec<Vec<PlaybackId>>,
+    /// The group that a playback makes of a group, or of none.
+    with: HashMap<(Option<GroupId>, PlaybackId), GroupId>,
+}
+
+impl Groups {
+    fn members(&self, group: GroupId) -> &[PlaybackId] {
+        &self.members[group.0 as usize]
+    }
+
+    /// The group with this playback in it too.
+    fn with(&mut self, group: Option<GroupId>, playback: PlaybackId) -> GroupId {
+        if let Some(known) = self.with.get(&(group, playback)) {
+            return *known;
+        }
+        let mut members = group.map_or_else(Vec::new, |group| self.members(group).to_vec());
+        let made = match group {
+            Some(group) if members.contains(&playback) => group,
+            _ => {
+                members.push(playback);
+                self.members.push(members);
+                GroupId(self.members.len() as u32 - 1)
+            }
+        };
+        self.with.insert((group, playback), made);
+        made
+    }
 }
 
 /// Frames by identity.
 #[derive(Debug, Default)]
 pub struct FrameSet {
     frames: HashMap<FrameId, Variant>,
+    groups: Groups,
     /// Further variants of identities in conflict, in the order seen.
     others: BTreeMap<FrameId, Vec<Variant>>,
     /// Running hash of the good frames of each playback.
@@ -57,23 +94,23 @@ impl FrameSet {
         self.note_in_fingerprint(playback, digest);
         let usable = !self.set_aside.contains(&(id, digest));
         let Some(first) = self.frames.get_mut(&id) else {
-            self.frames.insert(id, Variant { digest, playbacks: vec![playback] });
+            self.frames.insert(id, Variant { digest, playbacks: self.groups.with(None, playback) });
             if usable {
                 self.in_use.insert_if_contested(id, digest, &self.set_aside);
             }
             return (Novelty::New, usable);
         };
         if first.digest == digest {
-            note(&mut first.playbacks, playback);
+            first.playbacks = self.groups.with(Some(first.playbacks), playback);
             return (Novelty::Repeated, false);
         }
         let first_digest = first.digest;
         let others = self.others.entry(id).or_default();
         if let Some(other) = others.iter_mut().find(|other| other.digest == digest) {
-            note(&mut other.playbacks, playback);
+            other.playbacks = self.groups.with(Some(other.playbacks), playback);
             return (Novelty::Conflicting, false);
         }
-        others.push(Variant { digest, playbacks: vec![playback] });
+        others.push(Variant { digest, playbacks: self.groups.with(None, playback) });
         let first_in_use = !self.set_aside.contains(&(id, first_digest));
         let in_use = self.in_use.get(&id).copied().or(first_in_use.then_some(first_digest));
         match in_use {
@@ -92,7 +129,7 @@ impl FrameSet {
     /// Adds a frame known to be one of those added before under its identity; false where there are several, or none.
     pub fn add_repeat(&mut self, playback: PlaybackId, id: FrameId) -> bool {
         let Some(only) = self.frames.get_mut(&id).filter(|_| !self.others.contains_key(&id)) else { return false };
-        note(&mut only.playbacks, playback);
+        only.playbacks = self.groups.with(Some(only.playbacks), playback);
         let digest = only.digest;
         self.note_in_fingerprint(playback, digest);
         true
@@ -135,7 +172,12 @@ impl FrameSet {
 
     /// Playbacks that hold a variant, those with the same good frames counted once.
     fn votes(&self, variant: &Variant) -> usize {
-        variant.playbacks.iter().filter_map(|id| self.fingerprints.get(id)).collect::<BTreeSet<_>>().len()
+        self.groups
+            .members(variant.playbacks)
+            .iter()
+            .filter_map(|id| self.fingerprints.get(id))
+            .collect::<BTreeSet<_>>()
+            .len()
     }
 }
 
@@ -150,12 +192,6 @@ impl InUse for BTreeMap<FrameId, FrameDigest> {
         if contested {
             self.insert(id, digest);
         }
-    }
-}
-
-fn note(playbacks: &mut Vec<PlaybackId>, playback: PlaybackId) {
-    if playbacks.last() != Some(&playback) && !playbacks.contains(&playback) {
-        playbacks.push(playback);
     }
 }
 

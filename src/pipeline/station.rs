@@ -55,6 +55,9 @@ const CHECK_CELLS: usize = 144;
 /// And no fewer than this share of all cells, so that the checks of a mission that comes down at once cost little.
 const CHECK_SHARE: usize = 8;
 
+/// Products made before they are put in their places.
+const DERIVED_AT_ONCE: usize = 4096;
+
 /// Tenths of a second in which the end of a calibration is noticed at once; if all of them are lost, the next check does.
 const OVER_TENTHS: i64 = 600;
 
@@ -358,13 +361,16 @@ impl Station {
 
     fn recompute_products(&mut self, cells: impl IntoIterator<Item = i64>) {
         let corrections = &self.derived.range_corrections;
-        for cell in cells {
-            let Some(window) = self.windows.get(&cell) else { continue };
-            let product = derive::product(window, self.derived.current(), corrections, &self.settings.window);
-            if self.announced.get(&cell) != Some(&product.revision) {
-                self.unannounced.insert(cell);
+        let held = |cell: i64| Some((cell, self.windows.get(&cell)?.as_ref()));
+        let (cells, windows): (Vec<i64>, Vec<&Window>) = cells.into_iter().filter_map(held).unzip();
+        for (cells, windows) in cells.chunks(DERIVED_AT_ONCE).zip(windows.chunks(DERIVED_AT_ONCE)) {
+            let products = derive::products(windows, self.derived.current(), corrections, &self.settings.window);
+            for (cell, product) in cells.iter().zip(products) {
+                if self.announced.get(cell) != Some(&product.revision) {
+                    self.unannounced.insert(*cell);
+                }
+                self.products.insert(*cell, Arc::new(product));
             }
-            self.products.insert(cell, Arc::new(product));
         }
     }
 

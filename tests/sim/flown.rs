@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use oare_ground::pipeline::archive::Archive;
 use oare_ground::pipeline::calibration::{self, Derived};
-use oare_ground::pipeline::window::{Windows, windows};
+use oare_ground::pipeline::window::{Window, Windows, windows};
 use oare_ground::pipeline::{Product, Settings, derive};
 use oare_ground::simulate::truth::{TrueWindow, TruthBuilder};
 use oare_ground::simulate::{Mission, MissionConfig};
@@ -24,10 +24,9 @@ pub struct Flown {
 impl Flown {
     /// The products.
     pub fn products(&self) -> impl Iterator<Item = Product> {
-        let (settings, derived) = (Settings::sts65(), &self.derived);
-        self.windows
-            .values()
-            .map(move |window| derive::product(window, derived.current(), &derived.range_corrections, &settings.window))
+        let windows: Vec<&Window> = self.windows.values().map(Box::as_ref).collect();
+        let (current, corrections) = (self.derived.current(), &self.derived.range_corrections);
+        derive::products(&windows, current, corrections, &Settings::sts65().window).into_iter()
     }
 }
 

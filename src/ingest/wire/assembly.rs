@@ -18,6 +18,13 @@ struct Edge {
     tail: Option<Box<[u8]>>,
 }
 
+impl Edge {
+    /// Whether anything here may concern a neighbour.
+    fn waits(&self) -> bool {
+        self.passes_on || !self.head.is_empty() || self.tail.is_some()
+    }
+}
+
 /// Where a packet came from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Placement {
@@ -36,10 +43,13 @@ pub enum Assembled<'a> {
     Broken(Placement, &'a [u8]),
 }
 
+/// The frames of a channel by their count; None once nothing of a frame waits for its neighbours any more, which is soon so of most.
+type Edges = BTreeMap<u32, Option<Box<Edge>>>;
+
 /// Joins packets over frame borders.
 #[derive(Default)]
 pub struct Assembler {
-    channels: HashMap<u8, BTreeMap<u32, Edge>>,
+    channels: HashMap<u8, Edges>,
 }
 
 /// More frames than this no packet runs over: the longest packet in frames that hold one octet of data each would.
@@ -51,7 +61,7 @@ impl Assembler {
         let edge = walk(frame, &mut hand_on);
         let (continues, opens) = (edge.passes_on || !edge.head.is_empty(), edge.tail.is_some());
         let edges = self.channels.entry(frame.id.channel).or_default();
-        edges.insert(frame.id.count, edge);
+        edges.insert(frame.id.count, edge.waits().then(|| Box::new(edge)));
         if continues && let Some(start) = start_of_packet_into(edges, frame.id.count) {
             complete(edges, FrameId { count: start, ..frame.id }, &mut hand_on);
         }
@@ -85,11 +95,11 @@ fn walk(frame: &TransferFrame<'_>, hand_on: &mut impl FnMut(Assembled<'_>)) -> E
 }
 
 /// The frame with the unfinished packet that the head of frame `count` continues, if everything between is there.
-fn start_of_packet_into(edges: &BTreeMap<u32, Edge>, count: u32) -> Option<u32> {
+fn start_of_packet_into(edges: &Edges, count: u32) -> Option<u32> {
     let mut at = count;
     for _ in 0..SPAN_FRAMES_MAX {
         at = at.wrapping_sub(1);
-        let edge = edges.get(&at)?;
+        let edge = edges.get(&at)?.as_deref()?;
         if edge.tail.is_some() {
             return Some(at);
         }
@@ -101,16 +111,17 @@ fn start_of_packet_into(edges: &BTreeMap<u32, Edge>, count: u32) -> Option<u32> 
 }
 
 /// Hands on the packet that starts at the end of frame `first`, when the frames it runs over are there.
-fn complete(edges: &mut BTreeMap<u32, Edge>, first: FrameId, hand_on: &mut impl FnMut(Assembled<'_>)) {
-    let Some(tail) = edges.get(&first.count).and_then(|edge| edge.tail.as_ref()) else { return };
-    let mut octets = tail.to_vec();
+fn complete(edges: &mut Edges, first: FrameId, hand_on: &mut impl FnMut(Assembled<'_>)) {
+    let tail = edges.get(&first.count).and_then(|edge| edge.as_ref()?.tail.as_ref());
+    let Some(mut octets) = tail.map(|tail| tail.to_vec()) else { return };
     let mut last = first;
     let whole = loop {
         last.count = last.count.wrapping_add(1);
         let Some(edge) = edges.get(&last.count) else { return };
-        octets.extend_from_slice(&edge.head);
+        let (head, passes_on) = edge.as_ref().map_or((&[][..], false), |edge| (&edge.head, edge.passes_on));
+        octets.extend_from_slice(head);
         let total = packet::total_octets(&octets);
-        if !edge.passes_on {
+        if !passes_on {
             break total == Some(octets.len());
         }
         match total {
@@ -125,15 +136,20 @@ fn complete(edges: &mut BTreeMap<u32, Edge>, first: FrameId, hand_on: &mut impl 
 }
 
 /// Frees what a settled packet held.
-fn forget(edges: &mut BTreeMap<u32, Edge>, placement: Placement) {
-    if let Some(edge) = edges.get_mut(&placement.first.count) {
-        edge.tail = None;
-    }
-    if let Some(edge) = edges.get_mut(&placement.last.count)
-        && !edge.passes_on
-    {
-        edge.head = Box::default();
-    }
+fn forget(edges: &mut Edges, placement: Placement) {
+    let mut free = |count: u32, part: fn(&mut Edge)| {
+        let Some(place) = edges.get_mut(&count) else { return };
+        if let Some(edge) = place {
+            part(edge);
+        }
+        *place = place.take().filter(|edge| edge.waits());
+    };
+    free(placement.first.count, |edge| edge.tail = None);
+    free(placement.last.count, |edge| {
+        if !edge.passes_on {
+            edge.head = Box::default();
+        }
+    });
 }
 
 #[cfg(test)]

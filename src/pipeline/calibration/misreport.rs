@@ -4,10 +4,12 @@
 //! it was taken in: the scatter must be that of the mission, the level within a few micro-g of the bias of the range. Both are
 //! weighed for the range reported against every other, window by window for the span, second by second for its ends.
 
+use rayon::prelude::*;
+
 use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 use super::apply::Calibration;
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
-use crate::pipeline::window::{Window, Windows};
+use crate::pipeline::window::{AxisWindow, Window, Windows};
 use crate::telemetry::{AccRecord, Axis, Mode, Range};
 use crate::units::Clock;
 
@@ -68,22 +70,17 @@ impl Usual<'_> {
     }
 }
 
-fn usual_scatter_ng<'w>(
-    windows: impl Iterator<Item = &'w Window> + Clone,
-    resolution_ng: &[[f64; 3]; 3],
-) -> Option<[f64; 3]> {
-    let mut usual = [0.0; 3];
-    for axis in 0..3 {
-        let mut all: Vec<f64> = windows
-            .clone()
-            .filter(|w| w.mode == Mode::Normal)
-            .filter_map(|w| w.axes[axis].map(|a| a.estimate.winsorised_sd * resolution_ng[axis][a.range.index()]))
-            .collect();
+/// The middle scatter of each axis.
+fn usual_scatter_ng(windows: &[(i64, &Window)], resolution_ng: &[[f64; 3]; 3]) -> Option<[f64; 3]> {
+    let of_axis = |axis: usize| {
+        let scatter = |a: &AxisWindow| a.estimate.winsorised_sd * resolution_ng[axis][a.range.index()];
+        let mut all: Vec<f64> = windows.iter().filter_map(|(_, w)| w.axes[axis].as_ref().map(scatter)).collect();
         // The middle is enough; the mean of the two inner ones would cost a whole sort.
         let middle = all.len().checked_sub(1)? / 2;
-        usual[axis] = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
-    }
-    Some(usual)
+        Some(*all.select_nth_unstable_by(middle, f64::total_cmp).1)
+    };
+    let (x, (y, z)) = rayon::join(|| of_axis(0), || rayon::join(|| of_axis(1), || of_axis(2)));
+    Some([x?, y?, z?])
 }
 
 /// What speaks against the ranges reported, at most: no other range explains a window better than perfectly.
@@ -120,6 +117,17 @@ fn evidence(usual: &Usual<'_>, window: &Window, actual: Range) -> Option<[f64; 3
     Some(of_axes)
 }
 
+/// The range that a window speaks for where it is another than the one reported, with the evidence of its axes.
+fn best_other(usual: &Usual<'_>, window: &Window) -> Option<(Range, [f64; 3])> {
+    against(usual, window).filter(|most| *most > EVIDENCE_MIN)?;
+    let total = |of_axes: &[f64; 3]| of_axes.iter().sum::<f64>();
+    Range::ALL
+        .into_iter()
+        .filter_map(|range| evidence(usual, window, range).map(|of_axes| (range, of_axes)))
+        .max_by(|a, b| total(&a.1).total_cmp(&total(&b.1)))
+        .filter(|(_, of_axes)| total(of_axes) > EVIDENCE_MIN)
+}
+
 /// A run of windows that speak for another range.
 struct Span {
     cells: [i64; 2],
@@ -136,32 +144,30 @@ pub fn find(
     calibration: &Calibration,
     known_at: Clock,
 ) -> Vec<(Anomaly, Vec<RangeCorrection>)> {
-    let known = || windows.iter().filter(|(_, window)| window.known_since <= known_at);
-    let Some(scatter_ng) = usual_scatter_ng(known().map(|(_, window)| &**window), &calibration.resolution_ng) else {
-        return Vec::new();
-    };
+    let normal: Vec<(i64, &Window)> = windows
+        .iter()
+        .filter(|(_, window)| window.known_since <= known_at && window.mode == Mode::Normal)
+        .map(|(cell, window)| (*cell, window.as_ref()))
+        .collect();
+    let Some(scatter_ng) = usual_scatter_ng(&normal, &calibration.resolution_ng) else { return Vec::new() };
     let usual = Usual { scatter_ng, calibration };
     let mut spans: Vec<Span> = Vec::new();
-    for (cell, window) in known().filter(|(_, w)| w.mode == Mode::Normal) {
-        if against(&usual, window).is_none_or(|most| most <= EVIDENCE_MIN) {
-            continue;
-        }
-        let best = Range::ALL
-            .into_iter()
-            .filter_map(|range| evidence(&usual, window, range).map(|of_axes| (range, of_axes)))
-            .max_by(|a, b| a.1.iter().sum::<f64>().total_cmp(&b.1.iter().sum::<f64>()));
-        let Some((actual, of_axes)) = best.filter(|(_, of_axes)| of_axes.iter().sum::<f64>() > EVIDENCE_MIN) else {
-            continue;
-        };
-        let ln_ratio = ln_scatter_ratio(&usual, window);
+    let speaking: Vec<(i64, Range, [f64; 3], f64)> = normal
+        .par_iter()
+        .filter_map(|(cell, window)| {
+            let (actual, of_axes) = best_other(&usual, window)?;
+            Some((*cell, actual, of_axes, ln_scatter_ratio(&usual, window)))
+        })
+        .collect();
+    for (cell, actual, of_axes, ln_ratio) in speaking {
         match spans.last_mut() {
             Some(span) if span.actual == actual && cell - span.cells[1] <= CELLS_BETWEEN_MAX => {
-                span.cells[1] = *cell;
+                span.cells[1] = cell;
                 span.windows += 1;
                 span.ln_ratio.push(ln_ratio);
                 span.of_axes.iter_mut().zip(of_axes).for_each(|(sum, one)| *sum += one);
             }
-            _ => spans.push(Span { cells: [*cell, *cell], actual, windows: 1, of_axes, ln_ratio: vec![ln_ratio] }),
+            _ => spans.push(Span { cells: [cell, cell], actual, windows: 1, of_axes, ln_ratio: vec![ln_ratio] }),
         }
     }
     spans

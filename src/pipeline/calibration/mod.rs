@@ -113,8 +113,29 @@ pub fn derive(
     known: Option<&KnownCalibration>,
     previous: Option<&Derived>,
 ) -> Derived {
-    let law = &settings.window.trim;
-    let holds = sequence::holds(archive, windows, law, previous.map(|previous| &previous.means));
+    let (mut derived, (one_sided, time_correlation)) = rayon::join(
+        || estimate(archive, windows, settings, known, previous),
+        || (one_sided::compare(archive, &settings.window.trim), time_correlation::correlate(archive)),
+    );
+    derived.one_sided = one_sided;
+    derived.time_correlation = time_correlation;
+    derived.accuracy = Axis::ALL.map(|axis| analyse(axis, &derived));
+    find_anomalies(archive, windows, &mut derived);
+    derived
+}
+
+/// Bias laws and scale factors, version by version.
+fn estimate(
+    archive: &Archive,
+    windows: &Windows,
+    settings: &Settings,
+    known: Option<&KnownCalibration>,
+    previous: Option<&Derived>,
+) -> Derived {
+    let (holds, history) = rayon::join(
+        || sequence::holds(archive, windows, &settings.window.trim, previous.map(|previous| &previous.means)),
+        || NoiseHistory::new(windows, &settings.instrument.resolution_ng),
+    );
     let mut walks = Walks::default();
     let walked = previous.map(|previous| &previous.walks);
     let mut pairs = two_position::pairs(&holds);
@@ -122,7 +143,6 @@ pub fn derive(
     pairs.iter_mut().zip(excess).for_each(|(pair, excess)| pair.excess_ng2 = excess);
     let mut scales = scale_factor::sequences(archive, &holds);
     unsteady::of_scales(&holds, &mut scales, windows, settings, (&mut walks, walked));
-    let history = NoiseHistory::new(windows, &settings.instrument.resolution_ng);
     let configured = settings.window.correlated_samples.sqrt();
     let material = Material { pairs: &pairs, scales: &scales, settings };
     let mut derived = Derived {
@@ -163,10 +183,6 @@ pub fn derive(
         Some(known) => vec![known.calibration(settings)],
         None => derived.estimates.clone(),
     };
-    derived.one_sided = one_sided::compare(archive, law);
-    derived.time_correlation = time_correlation::correlate(archive);
-    derived.accuracy = Axis::ALL.map(|axis| analyse(axis, &derived));
-    find_anomalies(archive, windows, &mut derived);
     derived
 }
 
@@ -223,11 +239,14 @@ fn signature(
 
 fn find_anomalies(archive: &Archive, windows: &Windows, derived: &mut Derived) {
     let mut anomalies = Vec::new();
-    if let Some(calibration) = derived.current() {
-        for (anomaly, corrections) in misreport::find(archive, windows, calibration, Clock::from_tenths(i64::MAX)) {
-            anomalies.push(anomaly);
-            derived.range_corrections.extend(corrections);
-        }
+    let always = Clock::from_tenths(i64::MAX);
+    let (misreported, at_rail) = rayon::join(
+        || derived.current().map(|calibration| misreport::find(archive, windows, calibration, always)),
+        || saturation::runs(archive, windows),
+    );
+    for (anomaly, corrections) in misreported.into_iter().flatten() {
+        anomalies.push(anomaly);
+        derived.range_corrections.extend(corrections);
     }
     if let Some(settling) = derived.estimated.as_ref().and_then(|c| c.settling.as_ref()) {
         anomalies.extend(findings::settling(settling));
@@ -239,7 +258,7 @@ fn find_anomalies(archive: &Archive, windows: &Windows, derived: &mut Derived) {
     anomalies
         .extend(Axis::ALL.iter().filter_map(|axis| findings::shift(*axis, &derived.shifts[axis.index()], &sequences)));
     anomalies.extend(derived.measurements.iter().filter_map(findings::outlier));
-    anomalies.extend(saturation::find(archive, windows, &derived.range_corrections));
+    anomalies.extend(saturation::told(&at_rail, &derived.range_corrections));
     anomalies.sort_by(|a, b| a.from.cmp(&b.from).then(a.kind.cmp(&b.kind)).then(a.axes.cmp(&b.axes)));
     derived.anomalies = anomalies;
 }

@@ -28,7 +28,7 @@ const LOOKED_AT: Quality = Quality::SATURATED.with_if(Quality::TABLE_MOVING, tru
 
 /// One axis at the rail.
 #[derive(Debug, Clone, Copy)]
-struct Run {
+pub(super) struct Run {
     axis: Axis,
     from: Clock,
     to: Clock,
@@ -39,8 +39,8 @@ struct Run {
     turning: bool,
 }
 
-/// The saturations, in order of time.
-pub fn find(archive: &Archive, windows: &Windows, corrections: &[RangeCorrection]) -> Vec<Anomaly> {
+/// The axes' times at the rail.
+pub(super) fn runs(archive: &Archive, windows: &Windows) -> Vec<Run> {
     let mut cells: Vec<i64> = windows
         .iter()
         .filter(|(_, window)| window.quality.intersects(LOOKED_AT) || window.mode == Mode::Reentry)
@@ -55,6 +55,11 @@ pub fn find(archive: &Archive, windows: &Windows, corrections: &[RangeCorrection
             add(&mut runs, record, axis, &mut last[axis.index()]);
         }
     }
+    runs
+}
+
+/// Those of them that are saturations, in order of time.
+pub(super) fn told(runs: &[Run], corrections: &[RangeCorrection]) -> Vec<Anomaly> {
     let mut found: Vec<Anomaly> = runs.iter().filter(|run| is_told(run, corrections)).map(tell).collect();
     found.sort_by(|a, b| a.from.cmp(&b.from).then(a.axes.cmp(&b.axes)));
     found

@@ -1,8 +1,10 @@
 //! One version of the calibration: everything that the telemetry up to some instrument clock supports, and nothing later.
 
+use rayon::prelude::*;
+
 use super::anomaly::shift_sigma;
 use super::apply::{Bias, Calibration, Provenance, Scale};
-use super::bias_law::{Expectation, Point, fit};
+use super::bias_law::{BiasFit, Expectation, Point, fit};
 use super::noise::NoiseFactors;
 use super::scale_factor::{ScaleMeasurement, ScaleSequence, combine};
 use super::settling::{self, Transient};
@@ -62,10 +64,20 @@ pub(super) fn version(
     let settling = transients(&pairs, settings);
     let mut measurements = measure(&pairs, settling.as_ref(), &noise, settings);
     let mut bias: [[Option<Bias>; 3]; 3] = Default::default();
-    for axis in Axis::ALL {
-        for range in Range::ALL {
-            bias[axis.index()][range.index()] = fit_law(axis, range, &mut measurements, settling.as_ref(), settings);
+    let laws: Vec<(Axis, Range)> =
+        Axis::ALL.into_iter().flat_map(|axis| Range::ALL.map(|range| (axis, range))).collect();
+    let fits: Vec<Option<BiasFit>> = laws
+        .par_iter()
+        .map(|(axis, range)| fit_law(*axis, *range, &measurements, settling.as_ref(), settings))
+        .collect();
+    for ((axis, range), fit) in laws.into_iter().zip(fits) {
+        let Some(fit) = fit else { continue };
+        let of_law = measurements.iter_mut().filter(|m| m.axis == axis && m.range == range);
+        for (n, measurement) in of_law.enumerate() {
+            measurement.weight = fit.weights[n];
+            measurement.deleted_sigma = fit.deleted_sigmas[n];
         }
+        bias[axis.index()][range.index()] = Some(Bias::Fitted(Box::new(fit)));
     }
     let mut calibration = Calibration {
         version: number,
@@ -125,12 +137,11 @@ fn measure(
 fn fit_law(
     axis: Axis,
     range: Range,
-    measurements: &mut [BiasMeasurement],
+    measurements: &[BiasMeasurement],
     settling: Option<&[Transient; 2]>,
     settings: &Settings,
-) -> Option<Bias> {
-    let mut of_law: Vec<&mut BiasMeasurement> =
-        measurements.iter_mut().filter(|m| m.axis == axis && m.range == range).collect();
+) -> Option<BiasFit> {
+    let of_law: Vec<&BiasMeasurement> = measurements.iter().filter(|m| m.axis == axis && m.range == range).collect();
     let points: Vec<Point> = of_law
         .iter()
         .map(|m| Point {
@@ -141,16 +152,12 @@ fn fit_law(
         })
         .collect();
     let mut fit = fit(&points, &Expectation::published(axis.index(), range.index()))?;
-    for (n, measurement) in of_law.iter_mut().enumerate() {
-        measurement.weight = fit.weights[n];
-        measurement.deleted_sigma = fit.deleted_sigmas[n];
-    }
     if let (Range::C, Some(transient)) = (range, transient_of(settling, axis)) {
         // What is wrong with the transient is wrong in every measurement that it was taken from: half of those of Y.
         let share = of_law.iter().filter(|m| m.target == 2).count() as f64 / of_law.len() as f64;
         fit.covariance[0][0] += (share * transient.bias_sigma()).powi(2);
     }
-    Some(Bias::Fitted(Box::new(fit)))
+    Some(fit)
 }
 
 /// Measures the scale factors with the fitted biases and puts them into the calibration.
