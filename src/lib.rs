@@ -35,7 +35,8 @@
 //! ## Invariants, most of them absences
 //!
 //! - A pure room never reads a clock, opens a socket or a file, starts a thread or knows a runtime; time and seeds are
-//!   arguments. `tests/it/layering.rs` keeps this and the order of the rooms.
+//!   arguments. Work on many items is shared between processors in one place, `math::shared_work`, in an order that does not
+//!   show. `tests/it/layering.rs` keeps this and the order of the rooms.
 //! - Nothing counts a frame that is not durable in the raw log; every product is a function of the *set* of frames,
 //!   the configuration and the calibration policy. Arrival order, chunking and repeats change nothing.
 //! - Frames in = frames new + frames repeated + frames refused, by reason.

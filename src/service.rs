@@ -268,9 +268,11 @@ fn in_background<T: Send + 'static>(niceness: i32, work: impl FnOnce() -> T + Se
     })
 }
 
-/// The threads that share the work of a calibration give way too. A pool that the process has already stays as it is.
+/// The threads that share the work of a calibration give way too, and leave one processor to those who answer. A pool that the process
+/// has already stays as it is.
 fn shared_work_gives_way() {
-    let pool = rayon::ThreadPoolBuilder::new().start_handler(|_| give_way(PRODUCTS_GIVE_WAY));
+    let others = std::thread::available_parallelism().map_or(1, |processors| processors.get().saturating_sub(1).max(1));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(others).start_handler(|_| give_way(PRODUCTS_GIVE_WAY));
     if let Err(error) = pool.build_global() {
         tracing::debug!(%error, "the threads of shared work keep their priority");
     }

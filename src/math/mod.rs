@@ -3,3 +3,4 @@
 pub mod ranked;
 pub mod rms;
 pub mod robust;
+pub mod shared_work;

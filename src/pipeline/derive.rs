@@ -1,7 +1,6 @@
 //! A window and a calibration make a product.
 
 use rapidhash::v3::rapidhash_v3;
-use rayon::prelude::*;
 
 use super::axes::{OareVector, errors_to_body, to_body};
 use super::calibration::{Calibrated, Calibration, Measured, RangeCorrection};
@@ -9,6 +8,7 @@ use super::product::{BodyAcceleration, Product, Revision};
 use super::settings::WindowPolicy;
 use super::window::{AxisWindow, WINDOW_TENTHS, Window};
 use crate::math::robust::rounding_error_trimmed;
+use crate::math::shared_work;
 use crate::telemetry::{Axis, Quality, Range};
 
 /// The product of a window by a calibration, or without one.
@@ -64,7 +64,7 @@ pub fn products(
     corrections: &[RangeCorrection],
     policy: &WindowPolicy,
 ) -> Vec<Product> {
-    windows.par_iter().map(|window| product(window, calibration, corrections, policy)).collect()
+    shared_work::map(windows, |window| product(window, calibration, corrections, policy))
 }
 
 /// The range the sensor was in; a window at the edge of a correction holds samples of both.

@@ -41,6 +41,11 @@ const IMPURE: [&str; 12] = [
     "println!",
 ];
 
+/// The one file of the pure rooms in which work is shared between processors, in an order that does not show.
+fn shares_work(name: &str, word: &str) -> bool {
+    name == "math/shared_work.rs" && word == "rayon"
+}
+
 fn room_of(path: &str) -> usize {
     let path = path.trim_end_matches(".rs").replace("::", "/");
     // The longest name that fits: `ingest/wire` before `ingest`.
@@ -98,7 +103,7 @@ fn rooms_use_only_rooms_before_them_and_pure_rooms_touch_nothing_outside() {
                     faults.push(format!("{name}:{number} uses {path}"));
                 }
             }
-            let impure = IMPURE.iter().find(|word| ROOMS[room].1 && line.contains(*word));
+            let impure = IMPURE.iter().find(|word| ROOMS[room].1 && line.contains(*word) && !shares_work(&name, word));
             if let Some(word) = impure {
                 faults.push(format!("{name}:{number} is pure and names {word}"));
             }

@@ -4,10 +4,9 @@
 //! it was taken in: the scatter must be that of the mission, the level within a few micro-g of the bias of the range. Both are
 //! weighed for the range reported against every other, window by window for the span, second by second for its ends.
 
-use rayon::prelude::*;
-
 use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 use super::apply::Calibration;
+use crate::math::shared_work::{both, map};
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
 use crate::pipeline::window::{AxisWindow, Window, Windows};
 use crate::telemetry::{AccRecord, Axis, Mode, Range};
@@ -79,7 +78,7 @@ fn usual_scatter_ng(windows: &[(i64, &Window)], resolution_ng: &[[f64; 3]; 3]) -
         let middle = all.len().checked_sub(1)? / 2;
         Some(*all.select_nth_unstable_by(middle, f64::total_cmp).1)
     };
-    let (x, (y, z)) = rayon::join(|| of_axis(0), || rayon::join(|| of_axis(1), || of_axis(2)));
+    let (x, (y, z)) = both(|| of_axis(0), || both(|| of_axis(1), || of_axis(2)));
     Some([x?, y?, z?])
 }
 
@@ -152,14 +151,11 @@ pub fn find(
     let Some(scatter_ng) = usual_scatter_ng(&normal, &calibration.resolution_ng) else { return Vec::new() };
     let usual = Usual { scatter_ng, calibration };
     let mut spans: Vec<Span> = Vec::new();
-    let speaking: Vec<(i64, Range, [f64; 3], f64)> = normal
-        .par_iter()
-        .filter_map(|(cell, window)| {
-            let (actual, of_axes) = best_other(&usual, window)?;
-            Some((*cell, actual, of_axes, ln_scatter_ratio(&usual, window)))
-        })
-        .collect();
-    for (cell, actual, of_axes, ln_ratio) in speaking {
+    let speaking = map(&normal, |(cell, window)| {
+        let (actual, of_axes) = best_other(&usual, window)?;
+        Some((*cell, actual, of_axes, ln_scatter_ratio(&usual, window)))
+    });
+    for (cell, actual, of_axes, ln_ratio) in speaking.into_iter().flatten() {
         match spans.last_mut() {
             Some(span) if span.actual == actual && cell - span.cells[1] <= CELLS_BETWEEN_MAX => {
                 span.cells[1] = cell;

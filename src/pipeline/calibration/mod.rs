@@ -42,6 +42,7 @@ use self::version::{Material, version};
 use super::archive::Archive;
 use super::settings::Settings;
 use super::window::Windows;
+use crate::math::shared_work::both;
 use crate::telemetry::{Axis, Range};
 use crate::units::Clock;
 
@@ -113,7 +114,7 @@ pub fn derive(
     known: Option<&KnownCalibration>,
     previous: Option<&Derived>,
 ) -> Derived {
-    let (mut derived, (one_sided, time_correlation)) = rayon::join(
+    let (mut derived, (one_sided, time_correlation)) = both(
         || estimate(archive, windows, settings, known, previous),
         || (one_sided::compare(archive, &settings.window.trim), time_correlation::correlate(archive)),
     );
@@ -132,7 +133,7 @@ fn estimate(
     known: Option<&KnownCalibration>,
     previous: Option<&Derived>,
 ) -> Derived {
-    let (holds, history) = rayon::join(
+    let (holds, history) = both(
         || sequence::holds(archive, windows, &settings.window.trim, previous.map(|previous| &previous.means)),
         || NoiseHistory::new(windows, &settings.instrument.resolution_ng),
     );
@@ -240,7 +241,7 @@ fn signature(
 fn find_anomalies(archive: &Archive, windows: &Windows, derived: &mut Derived) {
     let mut anomalies = Vec::new();
     let always = Clock::from_tenths(i64::MAX);
-    let (misreported, at_rail) = rayon::join(
+    let (misreported, at_rail) = both(
         || derived.current().map(|calibration| misreport::find(archive, windows, calibration, always)),
         || saturation::runs(archive, windows),
     );

@@ -4,10 +4,9 @@
 //! and the decay), all positions together choose tau, and the mean of S over its error says whether there is a transient at
 //! all. What the trimmed mean would have been left with is the skew.
 
-use rayon::prelude::*;
-
 use super::sequence::Hold;
 use crate::math::robust::{TrimLaw, median};
+use crate::math::shared_work::map;
 use crate::telemetry::Axis;
 use crate::units::Clock;
 
@@ -191,8 +190,7 @@ fn best_tau(positions: &[Vec<Position>; 2]) -> Tau {
         let (amplitude, _) = mean_amplitude(of_axis, tau_s);
         of_axis.iter().map(|p| p.misfit(tau_s, amplitude)).sum::<f64>()
     };
-    let misfits: Vec<f64> =
-        TAUS_S.par_iter().map(|tau_s| positions.iter().map(|of_axis| misfit(of_axis, *tau_s)).sum()).collect();
+    let misfits = map(&TAUS_S, |tau_s| positions.iter().map(|of_axis| misfit(of_axis, *tau_s)).sum::<f64>());
     let best = (0..TAUS_S.len()).min_by(|a, b| misfits[*a].total_cmp(&misfits[*b])).unwrap_or(0);
     let inner = best.clamp(1, TAUS_S.len() - 2);
     let [x0, x1, x2] = [inner - 1, inner, inner + 1].map(|n| TAUS_S[n].ln());

@@ -1,7 +1,5 @@
 //! One version of the calibration: everything that the telemetry up to some instrument clock supports, and nothing later.
 
-use rayon::prelude::*;
-
 use super::anomaly::shift_sigma;
 use super::apply::{Bias, Calibration, Provenance, Scale};
 use super::bias_law::{BiasFit, Expectation, Point, fit};
@@ -9,6 +7,7 @@ use super::noise::NoiseFactors;
 use super::scale_factor::{ScaleMeasurement, ScaleSequence, combine};
 use super::settling::{self, Transient};
 use super::two_position::{BiasMeasurement, Pair};
+use crate::math::shared_work::map;
 use crate::pipeline::settings::Settings;
 use crate::telemetry::{Axis, Range};
 use crate::units::Clock;
@@ -66,10 +65,7 @@ pub(super) fn version(
     let mut bias: [[Option<Bias>; 3]; 3] = Default::default();
     let laws: Vec<(Axis, Range)> =
         Axis::ALL.into_iter().flat_map(|axis| Range::ALL.map(|range| (axis, range))).collect();
-    let fits: Vec<Option<BiasFit>> = laws
-        .par_iter()
-        .map(|(axis, range)| fit_law(*axis, *range, &measurements, settling.as_ref(), settings))
-        .collect();
+    let fits = map(&laws, |(axis, range)| fit_law(*axis, *range, &measurements, settling.as_ref(), settings));
     for ((axis, range), fit) in laws.into_iter().zip(fits) {
         let Some(fit) = fit else { continue };
         let of_law = measurements.iter_mut().filter(|m| m.axis == axis && m.range == range);
