@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use oare_ground::ingest::wire::{PlaybackPart, PlaybackReader};
 use oare_ground::pipeline::archive::Archive;
-use oare_ground::pipeline::calibration::{AnomalyKind, Derived, range_corrections_as_of};
+use oare_ground::pipeline::calibration::{AnomalyKind, Derived, KnownCalibration, range_corrections_as_of};
 use oare_ground::pipeline::station::replay;
 use oare_ground::pipeline::{PlaybackId, Product, Settings, Station};
 use oare_ground::simulate::{Fault, Mission, MissionConfig};
@@ -86,6 +86,42 @@ fn the_misreported_interval_of_the_defects_sample_is_found() {
     assert!((shift.value - 150.0).abs() < 3.0 * shift.sigma, "{}", shift.sentence);
     let aborted = derived.anomalies.iter().filter(|a| a.kind == AnomalyKind::ScaleRecordDefect).count();
     assert_eq!(aborted, 1);
+}
+
+/// Beside the pooled missions of `coverage`, the two samples: single ones, so that their errors are all of one piece.
+#[test]
+fn the_error_bars_of_the_samples_hold() {
+    for name in ["clean-6h", "defects-24h"] {
+        let Some(station) = station_of(name) else { return };
+        let known = std::fs::read_to_string(shared_data(&format!("dumps/{name}.instrument.json")).unwrap()).unwrap();
+        let known = KnownCalibration::parse(&known).unwrap().calibration(station.settings());
+        let (current, truth) = (station.calibration().unwrap(), truth_of(name));
+        println!("{name}: inside two standard errors, % (largest error in standard errors)");
+        println!("axis  bias, range C  acceleration  scale, 3 ranges");
+        for axis in Axis::ALL {
+            let i = axis.index();
+            let bias = station.windows().filter_map(|window| {
+                let (clock_s, t) = (window.centre_s(), window.temperature_c);
+                let [counts, sigma] = current.bias_and_error(axis, Range::C, clock_s, t)?;
+                Some((counts - known.bias_at(axis, Range::C, clock_s, t)?) / sigma)
+            });
+            let acceleration = station.products().filter(|p| !p.quality.contains(Quality::PARTIAL)).filter_map(|p| {
+                let (found, (truth, normal)) = (p.acceleration?, truth.get(&(p.start.seconds() as i64))?);
+                normal.then(|| (found.trimmed_ng.0[i] - truth[i]) / found.sigma_ng.0[i])
+            });
+            let scale = Range::ALL.into_iter().map(|range| {
+                let found = current.scale[i][range.index()];
+                (found.correction - known.scale[i][range.index()].correction) / found.sigma
+            });
+            let of: [Vec<f64>; 3] = [bias.collect(), acceleration.collect(), scale.collect()];
+            let inside = |z: &[f64]| z.iter().filter(|z| z.abs() < 2.0).count() as f64 / z.len() as f64;
+            let largest = |z: &[f64]| z.iter().fold(0.0, |most: f64, z| most.max(z.abs()));
+            let [bias, acceleration, scale] =
+                of.each_ref().map(|z| format!("{:5.1} ({:3.1})", 100.0 * inside(z), largest(z)));
+            println!("{}     {bias}    {acceleration}   {scale}", axis.letter().to_uppercase());
+            assert!(largest(&of[0]) < 4.0 && largest(&of[2]) < 4.0 && inside(&of[1]) > 0.92, "{name}, {axis:?}");
+        }
+    }
 }
 
 #[test]
