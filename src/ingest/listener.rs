@@ -21,7 +21,7 @@ use crate::ingest::wire::playback::{PlaybackPart, PlaybackReader};
 
 /// One read: long enough that a full-speed playback costs few wake-ups, short enough to decode in a millisecond.
 const READ_OCTETS: usize = 64 << 10;
-/// Reads waiting for the writer, of all connections: with `READ_OCTETS` the bound of what is taken and not yet durable.
+/// Reads waiting for the writer, of all connections: with `READ_OCTETS` the bound of what is decoded and not yet durable.
 pub const QUEUED_READS_MAX: usize = 64;
 /// Reads of one connection waiting to be decoded.
 const UNDECODED_READS_MAX: usize = 2;

@@ -37,6 +37,8 @@ pub const IDS: [&str; 21] = [
 ];
 
 const AXES: [&str; 3] = ["x", "y", "z"];
+/// The largest scale error a flight could have: a few per cent to a quarter are known, generously more.
+pub const SCALE_ERROR_MAX: f64 = 0.35;
 
 /// The kind of event an effect needs in the log, if any.
 pub fn event_needed(id: &str) -> Option<&'static str> {
@@ -186,7 +188,7 @@ impl Drawn {
         let push_ng = |limit: f64| limit / largest(&["ax_ng", "ay_ng", "az_ng"]);
         match self.id {
             "aerodynamic_drag" => 0.6 / largest(&["fraction"]),
-            "scale_factor" => 0.35 / largest(&["fraction"]),
+            "scale_factor" => SCALE_ERROR_MAX / largest(&["fraction"]),
             "solar_radiation_pressure" => 12.0 / largest(&["coefficient"]),
             "cg_offset" => 1.5 / largest(&["dx_m", "dy_m", "dz_m"]),
             "mass_shift" => 0.8 / largest(&["dx_m", "dy_m", "dz_m"]),

@@ -120,7 +120,8 @@ impl<'a> Matched<'a> {
                 vec![Group::Columns((0..9).map(|ij| column(ij / 3, ij % 3)).collect())]
             }
             "scale_factor" => {
-                (0..3).map(|i| Group::Columns(vec![total.iter().map(|a| Vector3::ith(i, a[i])).collect()])).collect()
+                let largest = |i: usize| total.iter().map(move |a| Vector3::ith(i, effect::SCALE_ERROR_MAX * a[i]));
+                (0..3).map(|i| Group::Within(vec![largest(i).collect()])).collect()
             }
             "misalignment" => {
                 let turned = |i: usize| total.iter().map(|a| a.cross(&Vector3::ith(i, 1.0))).collect();
