@@ -18,7 +18,7 @@ use oare_ground::hub::Body;
 use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader};
 use oare_ground::pipeline::{PlaybackId, Settings, Station};
 use oare_ground::service::Service;
-use oare_ground::simulate::recorder::{Framer, Packetiser, RecorderConfig, playbacks};
+use oare_ground::simulate::recorder::{RecorderConfig, frames, playbacks};
 use oare_ground::simulate::{Mission, MissionConfig};
 use serde_json::Value;
 use tokio::io::AsyncWriteExt;
@@ -59,15 +59,10 @@ fn machine() -> String {
 fn mission(hours: f64) -> Vec<u8> {
     let mission = Mission::new(MissionConfig::sts65(65, hours)).unwrap();
     let link = LinkConfig::default();
-    let (mut packetiser, mut framer) = (Packetiser::default(), Framer::new(link, 1, 0));
-    let mut frames = Vec::new();
-    for second in mission.fly() {
-        for sent in &second.sent {
-            framer.push(&packetiser.packet(sent), |frame| frames.push(frame));
-        }
-    }
-    framer.finish(|frame| frames.push(frame));
-    playbacks(&frames, &link, &RecorderConfig::clean(), 65).into_iter().flat_map(|pass| pass.octets).collect()
+    playbacks(&frames(&mission, link), &link, &RecorderConfig::clean(), 65)
+        .into_iter()
+        .flat_map(|pass| pass.octets)
+        .collect()
 }
 
 fn core_alone(octets: &[u8]) {

@@ -162,7 +162,7 @@ impl Pool {
         let mut joined = search::grow(frame, bank, &listed_ids, opens.iter().take(2).cloned().collect(), 2);
         joined.retain(|s| library.is_open(s));
         opens.extend(joined.into_iter().take(4));
-        distinct(&mut opens);
+        search::distinct(&mut opens);
         Some(Self { noise, listed, opens })
     }
 
@@ -269,15 +269,4 @@ fn polish(scene: &Scene, frame: &Frame, entries: &[Entry], sets: &mut Vec<Set>, 
         }
     }
     sets.sort_by(|a, b| b.score.total_cmp(&a.score));
-}
-
-fn distinct(sets: &mut Vec<Set>) {
-    sets.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let mut keys: Vec<Vec<usize>> = Vec::new();
-    sets.retain(|s| {
-        let key = s.key();
-        let new = !keys.contains(&key);
-        keys.push(key);
-        new
-    });
 }

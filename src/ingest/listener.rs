@@ -1,7 +1,8 @@
 //! The dump port: connections in, parts of playbacks out to the one writer.
 //!
-//! A connection is read by a task and decoded by a thread of its own that gives way to those who answer. It never writes to a sender. How a stream is cut into reads changes nothing. Not here: what is durable (see `raw_log`) and
-//! what the frames mean (see `pipeline`).
+//! A connection is read by a task and decoded by a thread of its own that gives way to those who answer. It never writes to a
+//! sender. How a stream is cut into reads changes nothing. Not here: what is durable (see `raw_log`) and what the frames mean (see
+//! `pipeline`).
 
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
@@ -23,7 +24,7 @@ use crate::ingest::wire::playback::{PlaybackPart, PlaybackReader};
 const READ_OCTETS: usize = 64 << 10;
 /// Reads waiting for the writer, of all connections: with `READ_OCTETS` the bound of what is decoded and not yet durable.
 pub const QUEUED_READS_MAX: usize = 64;
-/// Reads of one connection waiting to be decoded.
+/// Reads of one connection waiting to be decoded: one is at hand while the next comes in.
 const UNDECODED_READS_MAX: usize = 2;
 /// A drain is over for a sender that was silent for this long.
 const DRAIN_SILENCE: Duration = Duration::from_millis(200);

@@ -1,9 +1,10 @@
 //! Who gives way when every processor is busy: those who ask are answered first, then products are made, then searched for what a
 //! simulation left out.
 
-/// Niceness of what makes products: decoding, the writer, the recording.
+/// Niceness of what makes products: decoding, the writer, the recording. A tenth of the weight of those who ask, who are few and brief;
+/// enough to go on beside a machine that is busy otherwise.
 pub const PRODUCTS_GIVE_WAY: i32 = 10;
-/// Niceness of the searches of the running diagnosis.
+/// Niceness of the searches of the running diagnosis: a third of that again.
 pub const SEARCHES_GIVE_WAY: i32 = 15;
 
 /// Lowers the priority of this thread to a niceness. Where the system has no priority of single threads, all stay equal.

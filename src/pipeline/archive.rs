@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::timeline::{Timed, Timeline};
+use super::timeline::Timeline;
 use crate::ingest::wire::Record;
 use crate::telemetry::{AccRecord, Event, Housekeeping, OnBoardEstimate, TableReport};
 use crate::units::Clock;
@@ -49,10 +49,10 @@ impl Archive {
     pub fn add(&mut self, record: Record, sequence: u16) -> Addition {
         match record {
             Record::Acc(acc) => self.add_acc(acc),
-            Record::Hsk(report) => self.housekeeping.add(sequence, report),
-            Record::Tbl(report) => self.table.add(sequence, report),
-            Record::Evt(event) => self.events.add(sequence, event),
-            Record::Prc(estimate) => self.estimates.add(sequence, estimate),
+            Record::Hsk(report) => self.housekeeping.add(report.clock, sequence, report),
+            Record::Tbl(report) => self.table.add(report.clock, sequence, report),
+            Record::Evt(event) => self.events.add(event.clock, sequence, event),
+            Record::Prc(estimate) => self.estimates.add(estimate.clock, sequence, estimate),
         }
     }
 
@@ -136,28 +136,4 @@ fn precedence(acc: &AccRecord) -> (u16, i64, [[i16; 3]; 10], [usize; 3], u8, u8)
         crate::ingest::wire::record::data_status(acc),
         acc.target << 4 | acc.step as u8,
     )
-}
-
-impl Timed for Housekeeping {
-    fn clock(&self) -> Clock {
-        self.clock
-    }
-}
-
-impl Timed for TableReport {
-    fn clock(&self) -> Clock {
-        self.clock
-    }
-}
-
-impl Timed for Event {
-    fn clock(&self) -> Clock {
-        self.clock
-    }
-}
-
-impl Timed for OnBoardEstimate {
-    fn clock(&self) -> Clock {
-        self.clock
-    }
 }

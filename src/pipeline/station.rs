@@ -55,7 +55,7 @@ const CHECK_CELLS: usize = 144;
 /// And no fewer than this share of all cells, so that the checks of a mission that comes down at once cost little.
 const CHECK_SHARE: usize = 8;
 
-/// Products made before they are put in their places.
+/// Products made before they are put in their places: enough to share the work, few enough not to hold a mission's twice.
 const DERIVED_AT_ONCE: usize = 4096;
 
 /// Tenths of a second in which the end of a calibration is noticed at once; if all of them are lost, the next check does.

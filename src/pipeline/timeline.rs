@@ -6,21 +6,18 @@ use std::collections::BTreeMap;
 use super::archive::Addition;
 use crate::units::Clock;
 
-/// Tenths of a second in a chunk.
+/// Tenths of a second in a chunk: a hundred of the most frequent packets, which one that comes late may move.
 const CHUNK_TENTHS: i64 = 10_000;
-/// Places by which a chunk grows.
+/// Places by which a chunk grows: doubling would leave a quarter of them empty.
 const GROWTH: usize = 16;
 
-/// What a timeline can hold.
-pub trait Timed: PartialEq + std::fmt::Debug {
-    /// Its instrument time.
-    fn clock(&self) -> Clock;
-}
+/// Instrument time and sequence count.
+type Key = (Clock, u16);
 
 /// Packets by instrument time and sequence count.
 #[derive(Debug)]
 pub struct Timeline<T> {
-    chunks: BTreeMap<i64, Vec<(u16, T)>>,
+    chunks: BTreeMap<i64, Vec<(Key, T)>>,
 }
 
 impl<T> Default for Timeline<T> {
@@ -29,18 +26,18 @@ impl<T> Default for Timeline<T> {
     }
 }
 
-impl<T: Timed> Timeline<T> {
+impl<T: PartialEq + std::fmt::Debug> Timeline<T> {
     /// Adds one. Of two that claim one place and differ, the one whose debug form is lower stays, which is arbitrary but the same in
     /// every order.
-    pub fn add(&mut self, sequence: u16, value: T) -> Addition {
-        let chunk = self.chunks.entry(value.clock().tenths().div_euclid(CHUNK_TENTHS)).or_default();
-        let key = (value.clock(), sequence);
-        match chunk.binary_search_by_key(&key, |(sequence, held)| (held.clock(), *sequence)) {
+    pub fn add(&mut self, clock: Clock, sequence: u16, value: T) -> Addition {
+        let chunk = self.chunks.entry(clock.tenths().div_euclid(CHUNK_TENTHS)).or_default();
+        let key = (clock, sequence);
+        match chunk.binary_search_by_key(&key, |(held, _)| *held) {
             Err(at) => {
                 if chunk.len() == chunk.capacity() {
                     chunk.reserve_exact(GROWTH);
                 }
-                chunk.insert(at, (sequence, value));
+                chunk.insert(at, (key, value));
                 Addition::New
             }
             Ok(at) if chunk[at].1 == value => Addition::Repeat,
@@ -64,27 +61,18 @@ impl<T: Timed> Timeline<T> {
 mod tests {
     use super::*;
 
-    #[derive(Debug, PartialEq)]
-    struct Said(i64, &'static str);
-
-    impl Timed for Said {
-        fn clock(&self) -> Clock {
-            Clock::from_tenths(self.0)
-        }
-    }
-
     #[test]
     fn order_of_arrival_does_not_matter_and_of_two_that_differ_the_lower_stays() {
         let said = [(3, 20_001, "c"), (1, -5, "a"), (2, 20_001, "b"), (3, 20_001, "d")];
         for order in [[0, 1, 2, 3], [3, 2, 1, 0], [2, 3, 0, 1]] {
             let mut timeline = Timeline::default();
             for (sequence, tenths, text) in order.map(|n| said[n]) {
-                timeline.add(sequence, Said(tenths, text));
+                timeline.add(Clock::from_tenths(tenths), sequence, text);
             }
-            let held: Vec<&str> = timeline.iter().map(|said| said.1).collect();
+            let held: Vec<&str> = timeline.iter().copied().collect();
             assert_eq!(held, ["a", "b", "c"]);
-            assert_eq!(timeline.add(1, Said(-5, "a")), Addition::Repeat);
-            assert_eq!(timeline.add(3, Said(20_001, "e")), Addition::Conflict { replaced: false });
+            assert_eq!(timeline.add(Clock::from_tenths(-5), 1, "a"), Addition::Repeat);
+            assert_eq!(timeline.add(Clock::from_tenths(20_001), 3, "e"), Addition::Conflict { replaced: false });
         }
     }
 }

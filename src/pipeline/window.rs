@@ -3,7 +3,7 @@
 //! Two sorted halves of 25 s make a window, so that each half is sorted once. Samples at the rail, and samples taken
 //! while the table was not in its normal position, enter no estimate.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rapidhash::v3::rapidhash_v3;
 
@@ -129,6 +129,13 @@ pub struct Window {
 
 /// Windows by the number of their first cell. Boxed, because the nodes of a tree that grows at its end stay half empty.
 pub type Windows = BTreeMap<i64, Box<Window>>;
+
+/// Numbers of the cells under the windows wanted, in order.
+pub fn cells_of(windows: &Windows, wanted: impl Fn(&Window) -> bool) -> impl Iterator<Item = i64> {
+    let cells: BTreeSet<i64> =
+        windows.iter().filter(|(_, window)| wanted(window)).flat_map(|(cell, _)| [*cell, *cell + 1]).collect();
+    cells.into_iter()
+}
 
 impl Window {
     /// Middle of the window, s.

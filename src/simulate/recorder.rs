@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::ingest::wire::LinkConfig;
 use crate::ingest::wire::coding::{SYNC_MARKER, encode};
 
-use super::{Purpose, generator};
+use super::{Mission, Purpose, generator};
 
 /// What tape and link do. Rates and chances are 0 for a clean dump.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,6 +105,19 @@ pub struct Playback {
     pub touched: Vec<usize>,
     /// Indices of frames left out.
     pub lost: Vec<usize>,
+}
+
+/// Every frame of a whole flight, on the recorder's channel.
+pub fn frames(mission: &Mission, link: LinkConfig) -> Vec<Vec<u8>> {
+    let (mut packetiser, mut framer) = (Packetiser::default(), Framer::new(link, 1, 0));
+    let mut frames = Vec::new();
+    for second in mission.fly() {
+        for sent in &second.sent {
+            framer.push(&packetiser.packet(sent), |frame| frames.push(frame));
+        }
+    }
+    framer.finish(|frame| frames.push(frame));
+    frames
 }
 
 /// Cuts frames (as the [`Framer`] made them) into playbacks, and treats them as tape and link do.

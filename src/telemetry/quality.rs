@@ -47,11 +47,6 @@ impl Quality {
         self.0 & other.0 == other.0
     }
 
-    /// Whether any reason of `other` is here.
-    pub const fn intersects(self, other: Quality) -> bool {
-        self.0 & other.0 != 0
-    }
-
     /// Whether there is nothing to say against it.
     pub const fn is_good(self) -> bool {
         self.0 == 0

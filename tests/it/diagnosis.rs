@@ -13,7 +13,7 @@ use oare_ground::service::Service;
 use oare_ground::simulate::expected::case_files;
 use oare_ground::simulate::forces::Push;
 use oare_ground::simulate::noise::NoisePlan;
-use oare_ground::simulate::recorder::{Framer, Packetiser, RecorderConfig};
+use oare_ground::simulate::recorder::{RecorderConfig, frames};
 use oare_ground::simulate::{Mission, MissionConfig, playbacks};
 use serde_json::Value;
 
@@ -41,11 +41,7 @@ fn mission() -> &'static Flown {
         });
         let mission = Mission::new(config).unwrap();
         let link = LinkConfig::default();
-        let (mut packetiser, mut framer, mut frames) = (Packetiser::default(), Framer::new(link, 1, 0), Vec::new());
-        for second in mission.fly() {
-            second.sent.iter().for_each(|sent| framer.push(&packetiser.packet(sent), |frame| frames.push(frame)));
-        }
-        framer.finish(|frame| frames.push(frame));
+        let frames = frames(&mission, link);
         let tape = |frames: &[Vec<u8>]| {
             playbacks(frames, &link, &RecorderConfig::clean(), 1).into_iter().flat_map(|p| p.octets).collect()
         };

@@ -9,7 +9,7 @@ use oare_ground::pipeline::calibration::KnownCalibration;
 use oare_ground::pipeline::product::Revision;
 use oare_ground::pipeline::station::replay;
 use oare_ground::pipeline::{Change, PlaybackId, Settings, Station, files};
-use oare_ground::simulate::recorder::{Framer, Packetiser, RecorderConfig, playbacks};
+use oare_ground::simulate::recorder::{self, RecorderConfig, playbacks};
 use oare_ground::simulate::{Mission, MissionConfig};
 use oare_ground::telemetry::{AccRecord, Mode, Quality, Range, Step};
 use oare_ground::units::Clock;
@@ -121,15 +121,10 @@ fn a_late_frame_reopens_only_the_windows_it_touches() {
 fn simulated(hours: f64) -> Vec<u8> {
     let mission = Mission::new(MissionConfig::sts65(17, hours)).unwrap();
     let link = LinkConfig::default();
-    let (mut packetiser, mut framer) = (Packetiser::default(), Framer::new(link, 1, 0));
-    let mut frames = Vec::new();
-    for second in mission.fly() {
-        for sent in &second.sent {
-            framer.push(&packetiser.packet(sent), |frame| frames.push(frame));
-        }
-    }
-    framer.finish(|frame| frames.push(frame));
-    playbacks(&frames, &link, &RecorderConfig::clean(), 17).into_iter().flat_map(|pass| pass.octets).collect()
+    playbacks(&recorder::frames(&mission, link), &link, &RecorderConfig::clean(), 17)
+        .into_iter()
+        .flat_map(|pass| pass.octets)
+        .collect()
 }
 
 /// A window that is not whole is told of when the next look finds nothing more of it: two of the looks below.

@@ -280,21 +280,13 @@ async fn a_killed_service_has_everything_it_counted() {
 #[cfg(feature = "slow")]
 #[tokio::test(flavor = "multi_thread")]
 async fn fifty_kills_in_a_mission_lose_nothing() {
-    use oare_ground::simulate::recorder::{Framer, Packetiser, RecorderConfig, playbacks};
+    use oare_ground::simulate::recorder::{RecorderConfig, frames, playbacks};
     use oare_ground::simulate::{Mission, MissionConfig};
     /// The 14.75 days of STS-65.
     const HOURS: f64 = 354.0;
     let mission = Mission::new(MissionConfig::sts65(65, HOURS)).unwrap();
     let link = LinkConfig::default();
-    let (mut packetiser, mut framer) = (Packetiser::default(), Framer::new(link, 1, 0));
-    let mut frames = Vec::new();
-    for second in mission.fly() {
-        for sent in &second.sent {
-            framer.push(&packetiser.packet(sent), |frame| frames.push(frame));
-        }
-    }
-    framer.finish(|frame| frames.push(frame));
-    let passes = playbacks(&frames, &link, &RecorderConfig::messy(), 65);
+    let passes = playbacks(&frames(&mission, link), &link, &RecorderConfig::messy(), 65);
     let octets: Vec<u8> = passes.into_iter().flat_map(|pass| pass.octets).collect();
     kill_and_restart(&[octets], 50, 2.0, 65).await;
 }

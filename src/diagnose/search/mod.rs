@@ -306,6 +306,18 @@ pub fn best_of_entry(bank: &Bank, index: usize, chosen: &Chosen) -> (f64, Member
     (marginal + entry.log_prior, member)
 }
 
+/// Sorts sets by their score and keeps the best of those that have the same members.
+pub fn distinct(sets: &mut Vec<Set>) {
+    sets.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut keys: Vec<Vec<usize>> = Vec::new();
+    sets.retain(|set| {
+        let key = set.key();
+        let new = !keys.contains(&key);
+        keys.push(key);
+        new
+    });
+}
+
 /// Grow sets from `seeds` by one member each at a time, over the entries of `allowed`.
 pub fn grow(frame: &Frame, bank: &Bank, allowed: &[usize], seeds: Vec<Set>, size_max: usize) -> Vec<Set> {
     let mut found: Vec<Set> = seeds.clone();
@@ -326,14 +338,7 @@ pub fn grow(frame: &Frame, bank: &Bank, allowed: &[usize], seeds: Vec<Set>, size
                 next.push(grown);
             }
         }
-        next.sort_by(|a, b| b.score.total_cmp(&a.score));
-        let mut keys: Vec<Vec<usize>> = Vec::new();
-        next.retain(|s| {
-            let key = s.key();
-            let new = !keys.contains(&key);
-            keys.push(key);
-            new
-        });
+        distinct(&mut next);
         let best = found.iter().map(|s| s.score).fold(f64::NEG_INFINITY, f64::max);
         next.truncate(FINALISTS.max(BEAM) * 2);
         let alive = next.first().is_some_and(|s| s.score > best - 2.0);

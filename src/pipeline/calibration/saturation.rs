@@ -8,7 +8,7 @@
 
 use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 use crate::pipeline::archive::Archive;
-use crate::pipeline::window::Windows;
+use crate::pipeline::window::{Window, Windows, cells_of};
 use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, Step};
 use crate::units::Clock;
 
@@ -22,9 +22,6 @@ const STEP_COUNTS: i32 = 16_384;
 const APART_TENTHS: i64 = 50;
 /// Y at the rail for this long in reentry mode is the shutdown, s.
 const SHUTDOWN_S: f64 = 60.0;
-
-/// A window may hold a run when it says so, or when it has samples that it did not look at.
-const LOOKED_AT: Quality = Quality::SATURATED.with_if(Quality::TABLE_MOVING, true);
 
 /// One axis at the rail.
 #[derive(Debug, Clone, Copy)]
@@ -41,16 +38,15 @@ pub(super) struct Run {
 
 /// The axes' times at the rail.
 pub(super) fn runs(archive: &Archive, windows: &Windows) -> Vec<Run> {
-    let mut cells: Vec<i64> = windows
-        .iter()
-        .filter(|(_, window)| window.quality.intersects(LOOKED_AT) || window.mode == Mode::Reentry)
-        .flat_map(|(cell, _)| [*cell, *cell + 1])
-        .collect();
-    cells.sort_unstable();
-    cells.dedup();
+    // A window says so, or has samples that it did not look at.
+    let may_hold_one = |window: &Window| {
+        window.quality.contains(Quality::SATURATED)
+            || window.quality.contains(Quality::TABLE_MOVING)
+            || window.mode == Mode::Reentry
+    };
     let mut runs: Vec<Run> = Vec::new();
     let mut last: [Option<Last>; 3] = [None; 3];
-    for record in cells.into_iter().flat_map(|cell| archive.cell(cell)) {
+    for record in cells_of(windows, may_hold_one).flat_map(|cell| archive.cell(cell)) {
         for axis in Axis::ALL {
             add(&mut runs, record, axis, &mut last[axis.index()]);
         }

@@ -5,7 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use crate::math::robust::{TrimLaw, TrimmedMean, spread_counts, trimmed_mean_of_values};
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
-use crate::pipeline::window::Windows;
+use crate::pipeline::window::{Windows, cells_of};
 use crate::telemetry::{AccRecord, Axis, Mode, Quality, Range, Step};
 use crate::units::Clock;
 
@@ -132,16 +132,10 @@ pub fn holds<'a>(
     law: &TrimLaw,
     kept: Option<&HashMap<u64, Means>>,
 ) -> Vec<Hold<'a>> {
-    let mut cells: Vec<i64> = windows
-        .iter()
-        .filter(|(_, window)| window.quality.contains(Quality::TABLE_MOVING))
-        .flat_map(|(cell, _)| [*cell, *cell + 1])
-        .collect();
-    cells.sort_unstable();
-    cells.dedup();
+    let cells = cells_of(windows, |window| window.quality.contains(Quality::TABLE_MOVING));
     let mut holds: Vec<Hold<'a>> = Vec::new();
     let mut open = false;
-    for record in cells.into_iter().flat_map(|cell| archive.cell(cell)) {
+    for record in cells.flat_map(|cell| archive.cell(cell)) {
         let still = matches!(record.mode, Mode::Bias | Mode::Scale)
             && !matches!(record.step, Step::None | Step::Moving)
             && (!record.table_moving || record.step == Step::Rate);
