@@ -11,7 +11,6 @@ use oare_ground::diagnose::case::{Case, Header, Texts};
 use oare_ground::diagnose::error::CaseError;
 use oare_ground::diagnose::measured::{self, MeasuredCase};
 use oare_ground::diagnose::{recorder, report};
-use rayon::prelude::*;
 
 use super::output::{write, write_report};
 
@@ -128,16 +127,9 @@ fn analyse(args: &Args) -> Result<Analysis, CaseError> {
     if let Ok(style) = ProgressStyle::with_template("bootstrap {bar:40} {pos}/{len} {elapsed} (left {eta})") {
         bar.set_style(style);
     }
-    let replicates: Vec<f64> = (0..args.bootstraps)
-        .into_par_iter()
-        .map(|i| {
-            let statistic = prepared.replicate(i);
-            bar.inc(1);
-            statistic
-        })
-        .collect();
+    let reached = (args.bootstraps > 0).then(|| prepared.bootstrap().run(args.bootstraps, || bar.inc(1)));
     bar.finish_and_clear();
-    Ok(prepared.conclude(&replicates))
+    Ok(prepared.conclude(reached))
 }
 
 /// Reads a case directory.

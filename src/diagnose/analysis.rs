@@ -1,15 +1,12 @@
 //! The analysis of a case from end to end: scene, search, false-alarm probability, verdict, answer.
 //!
-//! Deterministic: the seed serves the bootstrap alone. Not here: files, threads; bootstrap replicates can be run one by one
-//! by whoever has threads, with [`Prepared::replicate`].
-
-use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
+//! Deterministic: the seed serves the bootstrap alone. Not here: files.
 
 use super::answer::Diagnosis;
+use super::bootstrap::{Bootstrap, Reached};
 use super::case::Case;
 use super::error::CaseError;
-use super::noise::{self, AxisNoise};
+use super::noise::AxisNoise;
 use super::null_table;
 use super::report::{CovariatePlate, Plates};
 use super::scene::{Axes, Scene};
@@ -50,8 +47,8 @@ pub struct Analysis {
 /// [`CaseError`] where the numbers defeat the physics or the estimation.
 pub fn analyse(case: &Case, settings: &Settings) -> Result<Analysis, CaseError> {
     let prepared = Prepared::new(case, settings)?;
-    let replicates = (0..settings.bootstraps).map(|i| prepared.replicate(i)).collect::<Vec<f64>>();
-    Ok(prepared.conclude(&replicates))
+    let reached = (settings.bootstraps > 0).then(|| prepared.bootstrap().run(settings.bootstraps, || ()));
+    Ok(prepared.conclude(reached))
 }
 
 /// The answer alone.
@@ -82,19 +79,9 @@ impl<'a> Prepared<'a> {
         Ok(Self { scene, library, solution, settings: settings.clone() })
     }
 
-    /// The statistic of replicate `index`: a record of the fitted noise alone through the whole search, the noise fitted anew.
-    pub fn replicate(&self, index: usize) -> f64 {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(
-            self.settings.seed.wrapping_mul(1_000_003).wrapping_add(index as u64),
-        );
-        let noise = self.null_noise();
-        let residual: Axes = std::array::from_fn(|k| {
-            noise::simulate(&noise[k], &self.scene.schedule, &self.scene.activity[k], || {
-                StandardNormal.sample(&mut rng)
-            })
-        });
-        let scene = self.scene.with_residual(residual);
-        solve(&scene, &self.library, Some(&noise)).statistic()
+    /// The bootstrap of this case.
+    pub fn bootstrap(&self) -> Bootstrap<'_> {
+        Bootstrap::new(&self.scene, &self.library, self.null_noise(), self.settings.seed, self.solution.statistic())
     }
 
     /// Noise under which the bootstrap is made: that of the best hypothesis, for its residual holds no effect, unless it is larger
@@ -112,19 +99,14 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// False-alarm probability and verdict; `replicates` are statistics of bootstrap replicates, empty for the table.
-    pub fn conclude(&self, replicates: &[f64]) -> Analysis {
-        let statistic = self.solution.statistic();
-        let table = null_table::false_alarm_probability(statistic);
-        let probability = if replicates.is_empty() {
-            table
-        } else {
-            let reached = replicates.iter().filter(|r| **r >= statistic).count();
-            (reached + 1) as f64 / (replicates.len() + 1) as f64
+    /// False-alarm probability, from the bootstrap where there was one, else from the table of nulls, and verdict.
+    pub fn conclude(&self, reached: Option<Reached>) -> Analysis {
+        let table = null_table::false_alarm_probability(self.solution.statistic());
+        let decisive = match reached {
+            // Few replicates cannot show a small probability: then the table decides, and the bootstrap may only forbid.
+            Some(r) if r.least <= self.settings.claim_probability || r.probability > 3.0 * r.least => r.probability,
+            _ => table,
         };
-        // Few replicates cannot show a small probability: then the table decides, and the bootstrap may only forbid.
-        let enough = (replicates.len() + 1) as f64 * self.settings.claim_probability >= 1.0;
-        let decisive = if enough || probability > 3.0 / (replicates.len() + 1) as f64 { probability } else { table };
         let (diagnosis, model_ng, ladder) =
             verdict::conclude(&self.scene, &self.library, &self.solution, decisive, self.settings.claim_probability);
         Analysis { plates: plates(&self.scene, model_ng, ladder), diagnosis }

@@ -5,19 +5,24 @@
 //! 1/2 y' (A + I)^-1 y - 1/2 log det (A + I), A = X'X and y = X'd, the columns scaled by their prior size (Kennedy and
 //! O'Hagan 2001 for why sizes need priors). Not here: what the columns mean.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::noise::{AxisNoise, Schedule, Whitener, dot};
 use super::scene::Axes;
+use crate::math::shared_work;
 
 /// A regressor before whitening: a series for every axis it acts on.
 pub type Raw = [Option<Vec<f64>>; 3];
 
+/// One axis of a whitened regressor: `factor` times what is shared with the same regressor of other sizes.
 #[derive(Debug, Clone)]
 struct Part {
     first: usize,
-    whitened: Vec<f64>,
+    whitened: Arc<Vec<f64>>,
     constant: f64,
+    factor: f64,
 }
 
 /// A whitened regressor, the constant of every axis projected out of every product.
@@ -34,10 +39,12 @@ impl Column {
             let (Some(a), Some(b)) = (a, b) else { continue };
             let first = a.first.max(b.first);
             let end = (a.first + a.whitened.len()).min(b.first + b.whitened.len());
-            if first < end {
-                sum += dot(&a.whitened[first - a.first..end - a.first], &b.whitened[first - b.first..end - b.first]);
-            }
-            sum -= a.constant * b.constant;
+            let product = if first < end {
+                dot(&a.whitened[first - a.first..end - a.first], &b.whitened[first - b.first..end - b.first])
+            } else {
+                0.0
+            };
+            sum += a.factor * b.factor * (product - a.constant * b.constant);
         }
         sum
     }
@@ -45,10 +52,7 @@ impl Column {
     /// This column times `factor`.
     pub fn times(&self, factor: f64) -> Column {
         let mut out = self.clone();
-        for part in out.parts.iter_mut().flatten() {
-            part.whitened.iter_mut().for_each(|x| *x *= factor);
-            part.constant *= factor;
-        }
+        out.parts.iter_mut().flatten().for_each(|part| part.factor *= factor);
         out
     }
 
@@ -57,35 +61,76 @@ impl Column {
         let mut out = self.clone();
         for (a, b) in out.parts.iter_mut().zip(&other.parts) {
             let Some(b) = b else { continue };
-            let part = a.get_or_insert_with(|| Part { first: b.first, whitened: Vec::new(), constant: 0.0 });
-            let first = part.first.min(b.first);
-            let end = (part.first + part.whitened.len()).max(b.first + b.whitened.len());
+            let (first, end) = match a {
+                Some(a) => (a.first.min(b.first), (a.first + a.whitened.len()).max(b.first + b.whitened.len())),
+                None => (b.first, b.first + b.whitened.len()),
+            };
             let mut whitened = vec![0.0; end - first];
-            whitened[part.first - first..part.first - first + part.whitened.len()].copy_from_slice(&part.whitened);
-            for (x, y) in whitened[b.first - first..].iter_mut().zip(&b.whitened) {
-                *x -= factor * y;
+            let mut constant = 0.0;
+            let mut add = |part: &Part, factor: f64| {
+                whitened[part.first - first..].iter_mut().zip(&*part.whitened).for_each(|(x, y)| *x += factor * y);
+                constant += factor * part.constant;
+            };
+            if let Some(a) = &*a {
+                add(a, a.factor);
             }
-            *part = Part { first, whitened, constant: part.constant - factor * b.constant };
+            add(b, -factor * b.factor);
+            *a = Some(Part { first, whitened: Arc::new(whitened), constant, factor: 1.0 });
         }
         out
     }
 
-    /// Whitened values of one axis with the constant's share removed; empty where the column is absent.
+    /// Whitened values of one axis with the constant's share removed; zero where the column is absent.
     pub fn projected(&self, axis: usize, frame: &Frame) -> Vec<f64> {
         match &self.parts[axis] {
             Some(p) => {
                 let value = |i: usize| i.checked_sub(p.first).and_then(|j| p.whitened.get(j)).copied().unwrap_or(0.0);
-                frame.ones[axis].iter().enumerate().map(|(i, o)| value(i) - p.constant * o).collect()
+                let ones = frame.ones[axis].iter().enumerate();
+                ones.map(|(i, o)| p.factor * (value(i) - p.constant * o)).collect()
             }
             None => vec![0.0; frame.ones[axis].len()],
         }
     }
 }
 
+/// A series on one axis and its prior size.
+#[derive(Debug, Clone, Copy)]
+pub struct OnAxis<'a> {
+    /// The body axis.
+    pub axis: usize,
+    /// The series at the windows.
+    pub series: &'a [f64],
+    /// Its prior size.
+    pub size: f64,
+}
+
+/// Series of an axis that are whitened side by side.
+const LANES: usize = 4;
+
+impl Column {
+    fn of(parts: impl IntoIterator<Item = (usize, Part)>) -> Self {
+        let mut column = Self::default();
+        for (axis, part) in parts {
+            column.parts[axis] = Some(part);
+        }
+        column
+    }
+}
+
+/// First window in which a series is not zero, and one past the last.
+fn span(series: &[f64]) -> [usize; 2] {
+    let first = series.iter().position(|x| *x != 0.0).unwrap_or(series.len());
+    [first, series.iter().rposition(|x| *x != 0.0).map_or(first, |i| i + 1)]
+}
+
 /// The noise of all axes turned into filters, and the data behind them.
+#[derive(Clone)]
 pub struct Frame {
-    whiteners: [Whitener; 3],
-    ones: Axes,
+    whiteners: Arc<[Whitener; 3]>,
+    /// The whitened constant of each axis, of unit norm.
+    ones: Arc<Axes>,
+    /// Log restricted likelihood but for the data's share.
+    log_det: f64,
     /// The whitened residual.
     pub data: Column,
     /// Log restricted likelihood of no effect at all.
@@ -96,73 +141,77 @@ impl Frame {
     /// From the noise of the three axes and the residual.
     pub fn new(noise: &[AxisNoise; 3], schedule: &Schedule, activity: &Axes, residual_ng: &Axes) -> Self {
         let whiteners: [Whitener; 3] = std::array::from_fn(|k| Whitener::new(&noise[k], schedule, &activity[k]));
-        let mut log_null = 0.0;
+        let mut log_det = 0.0;
         let ones = std::array::from_fn(|k| {
             let mut one = whiteners[k].whiten(&vec![1.0; schedule.len()]);
             let norm = dot(&one, &one).sqrt();
             one.iter_mut().for_each(|x| *x /= norm);
-            log_null -= 0.5 * whiteners[k].log_det() + norm.ln();
+            log_det -= 0.5 * whiteners[k].log_det() + norm.ln();
             one
         });
-        let mut frame = Self { whiteners, ones, data: Column::default(), log_null };
-        frame.data = frame.column(&std::array::from_fn(|k| Some(residual_ng[k].clone())), 1.0);
-        frame.log_null -= 0.5 * frame.data.dot(&frame.data);
-        frame
+        let (whiteners, ones) = (Arc::new(whiteners), Arc::new(ones));
+        Self { whiteners, ones, log_det, data: Column::default(), log_null: log_det }.with_data(residual_ng)
+    }
+
+    /// The same filters, another residual.
+    pub fn with_data(&self, residual_ng: &Axes) -> Self {
+        let data = self.column(&std::array::from_fn(|k| Some(residual_ng[k].clone())), 1.0);
+        let log_null = self.log_det - 0.5 * data.dot(&data);
+        Self { data, log_null, ..self.clone() }
     }
 
     /// Whiten a regressor, scaled by its prior size.
     pub fn column(&self, raw: &Raw, size: f64) -> Column {
-        let whole = |s: &Vec<f64>| s.first().is_some_and(|x| *x != 0.0) && s.last().is_some_and(|x| *x != 0.0);
         if let [Some(x), Some(y), Some(z)] = raw
-            && [x, y, z].into_iter().all(whole)
+            && [x, y, z].into_iter().all(|series| span(series) == [0, series.len()])
         {
             let whitened = Whitener::whiten_three(&self.whiteners, [x, y, z]);
-            return Column { parts: self.whole_parts(whitened, [size; 3]).map(Some) };
+            return Column::of(whitened.into_iter().enumerate().map(|(k, w)| (k, self.part(k, 0, w, size))));
         }
-        Column { parts: std::array::from_fn(|k| raw[k].as_ref().map(|series| self.part(k, series, size))) }
+        let on_axes = raw.iter().enumerate().filter_map(|(axis, series)| Some((axis, series.as_ref()?)));
+        Column::of(on_axes.map(|(axis, series)| {
+            let span = span(series);
+            let [whitened] = self.whiteners[axis].whiten_spans([series], [span]);
+            (axis, self.part(axis, span[0], whitened, size))
+        }))
+    }
+
+    /// Whiten many regressors, each by its series on the axes it acts on: those of an axis side by side.
+    pub fn columns(&self, many: &[Vec<OnAxis>]) -> Vec<Column> {
+        let flat: Vec<(usize, OnAxis, [usize; 2])> = many
+            .iter()
+            .enumerate()
+            .flat_map(|(owner, parts)| parts.iter().map(move |part| (owner, *part, span(part.series))))
+            .collect();
+        let mut order: Vec<usize> = (0..flat.len()).collect();
+        order.sort_by_key(|i| (flat[*i].1.axis, flat[*i].2));
+        let groups: Vec<&[usize]> =
+            order.chunk_by(|a, b| flat[*a].1.axis == flat[*b].1.axis).flat_map(|axis| axis.chunks(LANES)).collect();
+        let parts = shared_work::map(&groups, |group| {
+            // A group that is not full whitens its first series again in the lanes left over.
+            let lanes: [usize; LANES] = std::array::from_fn(|l| group[if l < group.len() { l } else { 0 }]);
+            let axis = flat[group[0]].1.axis;
+            let whitened = self.whiteners[axis].whiten_spans(lanes.map(|i| flat[i].1.series), lanes.map(|i| flat[i].2));
+            let whitened = lanes.into_iter().zip(whitened).take(group.len());
+            whitened.map(|(i, w)| self.part(axis, flat[i].2[0], w, flat[i].1.size)).collect::<Vec<Part>>()
+        });
+        let mut columns = vec![Column::default(); many.len()];
+        for (i, part) in order.iter().zip(parts.into_iter().flatten()) {
+            let (owner, OnAxis { axis, .. }, _) = flat[*i];
+            columns[owner].parts[axis] = Some(part);
+        }
+        columns
+    }
+
+    fn part(&self, axis: usize, first: usize, whitened: Vec<f64>, size: f64) -> Part {
+        let ones = self.ones[axis].get(first..first + whitened.len()).unwrap_or_default();
+        let constant = dot(&whitened, ones);
+        Part { first, whitened: Arc::new(whitened), constant, factor: size }
     }
 
     /// Whiten a scalar on one axis.
     pub fn scalar(&self, axis: usize, series: &[f64], size: f64) -> Column {
-        let mut column = Column::default();
-        column.parts[axis] = Some(self.part(axis, series, size));
-        column
-    }
-
-    /// Whiten a scalar on each axis: three columns.
-    pub fn scalars(&self, series: &[f64], sizes: &[f64; 3]) -> [Column; 3] {
-        let ends = [series.first(), series.last()];
-        let parts = if ends.iter().all(|x| x.is_some_and(|x| *x != 0.0)) {
-            self.whole_parts(Whitener::whiten_three(&self.whiteners, [series; 3]), *sizes)
-        } else {
-            std::array::from_fn(|k| self.part(k, series, sizes[k]))
-        };
-        let mut axis = 0;
-        parts.map(|part| {
-            let mut column = Column::default();
-            column.parts[axis] = Some(part);
-            axis += 1;
-            column
-        })
-    }
-
-    fn whole_parts(&self, whitened: [Vec<f64>; 3], sizes: [f64; 3]) -> [Part; 3] {
-        let mut axis = 0;
-        whitened.map(|mut whitened| {
-            whitened.iter_mut().for_each(|x| *x *= sizes[axis]);
-            let constant = dot(&whitened, &self.ones[axis]);
-            axis += 1;
-            Part { first: 0, whitened, constant }
-        })
-    }
-
-    fn part(&self, axis: usize, series: &[f64], size: f64) -> Part {
-        let first = series.iter().position(|x| *x != 0.0).unwrap_or(series.len());
-        let last = series.iter().rposition(|x| *x != 0.0).map_or(first, |i| i + 1);
-        let mut whitened = self.whiteners[axis].whiten_span(series, first, last);
-        whitened.iter_mut().for_each(|x| *x *= size);
-        let constant = dot(&whitened, &self.ones[axis][first..first + whitened.len()]);
-        Part { first, whitened, constant }
+        self.columns(&[vec![OnAxis { axis, series, size }]]).swap_remove(0)
     }
 
     /// Predictive standard deviations of an axis.

@@ -19,7 +19,7 @@ use super::noise::AxisNoise;
 use super::recorder::Usable;
 use super::report;
 use super::scene::{Scene, Surroundings};
-use super::solve::{Library, solve_unless};
+use super::solve::{Library, Stop, solve_unless};
 use super::{null_table, verdict};
 
 /// Looks kept for readers.
@@ -206,7 +206,7 @@ impl Live {
     }
 
     /// Looks at the windows so far; whether it did: not when `stop` said so in between.
-    pub fn look(&mut self, usable: Usable, stop: &dyn Fn() -> bool) -> bool {
+    pub fn look(&mut self, usable: Usable, stop: Stop) -> bool {
         let seen = Seen::from(&usable);
         let case = match Case::meet(self.expected.clone(), usable.recording) {
             Ok(case) => case,

@@ -6,6 +6,7 @@
 
 pub mod analysis;
 pub mod answer;
+pub mod bootstrap;
 pub mod case;
 pub mod catalogue;
 pub mod design;

@@ -180,6 +180,56 @@ impl Memory {
     }
 }
 
+/// Windows between two looks at whether all of them are over.
+const CHUNK: usize = 64;
+
+/// The whitened innovations of the next values of several series.
+#[inline(always)]
+fn whiten_lanes<const L: usize>(memory: &mut [[f64; L]; 3], row: &Row, x: [f64; L]) -> [f64; L] {
+    let [z0, z1, z2] = memory;
+    let mut out = [0.0; L];
+    for l in 0..L {
+        let (one, two) = (z1[l] * row.decay[0], z2[l] * row.decay[1]);
+        let innovation = x[l] - row.h0 * z0[l] - row.h1 * one - two;
+        z0[l] = row.gain[0] * innovation;
+        z1[l] = one + row.gain[1] * innovation;
+        z2[l] = two + row.gain[2] * innovation;
+        out[l] = innovation * row.per_sd;
+    }
+    out
+}
+
+/// Where what a filter remembers of a series is negligible.
+struct Tail {
+    last: usize,
+    largest: f64,
+    quiet: usize,
+    end: Option<usize>,
+}
+
+impl Tail {
+    fn new([first, last]: [usize; 2]) -> Self {
+        // Of a series of zeros nothing is remembered.
+        Self { last, largest: 0.0, quiet: 0, end: (first >= last).then_some(first) }
+    }
+
+    /// Goes on over innovations, the first of which is that of window `at`.
+    fn follow(&mut self, innovations: &[f64], at: usize) {
+        let inside = self.last.saturating_sub(at).min(innovations.len());
+        for w in &innovations[..inside] {
+            let w = w.abs();
+            self.largest = if w > self.largest { w } else { self.largest };
+        }
+        for (i, w) in innovations.iter().enumerate().skip(inside) {
+            if self.end.is_some() {
+                return;
+            }
+            self.quiet = if w.abs() < 1e-5 * self.largest { self.quiet + 1 } else { 0 };
+            self.end = (self.quiet > 8).then_some(at + i + 1);
+        }
+    }
+}
+
 /// The whitening filter of one axis: linear, the same for data and for every regressor.
 #[derive(Debug, Clone)]
 pub struct Whitener {
@@ -209,26 +259,46 @@ impl Whitener {
 
     /// Whitened innovations of a series at the windows.
     pub fn whiten(&self, series: &[f64]) -> Vec<f64> {
-        self.whiten_span(series, 0, series.len())
+        let mut memory = Memory::default();
+        self.rows.iter().zip(series).map(|(row, x)| memory.whiten(row, *x)).collect()
     }
 
-    /// The same for a series that is zero outside windows `first..last`; the answer starts at `first` and ends where
-    /// what the filter remembers of the series is negligible (1e-5 of its largest value).
-    pub fn whiten_span(&self, series: &[f64], first: usize, last: usize) -> Vec<f64> {
-        let mut memory = Memory::default();
-        let mut out = Vec::with_capacity(series.len() - first);
-        let (mut largest, mut quiet) = (0.0_f64, 0);
-        for (i, (row, x)) in self.rows[first..].iter().zip(&series[first..]).enumerate() {
-            let w = memory.whiten(row, *x);
-            out.push(w);
-            if first + i < last {
-                largest = largest.max(w.abs());
-            } else {
-                quiet = if w.abs() < 1e-5 * largest { quiet + 1 } else { 0 };
-                if quiet > 8 {
-                    break;
-                }
+    /// Whitened innovations of several series, which are zero outside their own span of windows (first, and one past the last).
+    /// Each answer starts at the first window of its span and ends where what the filter remembers is negligible (1e-5 of its
+    /// largest value).
+    ///
+    /// Side by side, because one after the other waits for itself: every step of a filter needs the one before.
+    pub fn whiten_spans<const L: usize>(&self, series: [&[f64]; L], spans: [[usize; 2]; L]) -> [Vec<f64>; L] {
+        let n = self.rows.len();
+        let begin = spans.iter().map(|span| span[0]).min().unwrap_or(0).min(n);
+        let rest = spans.iter().map(|span| span[1]).max().unwrap_or(n);
+        let series = series.map(|s| &s[..n]);
+        let mut memory = [[0.0; L]; 3];
+        let mut out: [Vec<f64>; L] = std::array::from_fn(|_| Vec::with_capacity(n - begin));
+        let mut tails = spans.map(Tail::new);
+        for chunk in (begin..n).step_by(CHUNK) {
+            let end = (chunk + CHUNK).min(n);
+            let mut values = [[0.0; L]; CHUNK];
+            for (l, series) in series.iter().enumerate() {
+                values.iter_mut().zip(&series[chunk..end]).for_each(|(value, x)| value[l] = *x);
             }
+            for (value, row) in values.iter_mut().zip(&self.rows[chunk..end]) {
+                *value = whiten_lanes(&mut memory, row, *value);
+            }
+            for (l, out) in out.iter_mut().enumerate() {
+                out.extend(values[..end - chunk].iter().map(|value| value[l]));
+            }
+            for (tail, out) in tails.iter_mut().zip(&out).filter(|(tail, _)| tail.last < n) {
+                tail.follow(&out[chunk - begin..], chunk);
+            }
+            if end > rest && tails.iter().all(|tail| tail.end.is_some()) {
+                break;
+            }
+        }
+        for (l, out) in out.iter_mut().enumerate() {
+            out.truncate(tails[l].end.unwrap_or(n).max(begin) - begin);
+            out.drain(..(spans[l][0].min(n) - begin).min(out.len()));
+            out.shrink_to_fit();
         }
         out
     }

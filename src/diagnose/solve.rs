@@ -1,11 +1,12 @@
 //! From a scene to weighed hypotheses: nothing, listed sets, and sets with an open form. It still decides nothing.
 
-use super::catalogue;
+use super::catalogue::{self, Effect};
 use super::design::Frame;
 use super::noise::AxisNoise;
 use super::open_form::{self, Atom};
 use super::scene::Scene;
 use super::search::{self, Bank, Entry, SET_MAX, Set, Weighed};
+use crate::math::shared_work;
 
 /// Log prior odds of the open forms together; they share it.
 const OPEN_LOG_PRIOR: f64 = -4.0;
@@ -33,13 +34,14 @@ pub struct Library {
 impl Library {
     /// The whole catalogue but the ids of `without`, and the dictionary.
     pub fn new(scene: &Scene, without: &[String]) -> Self {
-        let mut entries: Vec<Entry> = catalogue::ALL
-            .iter()
-            .filter(|e| !without.iter().any(|id| id == e.id))
-            .filter_map(|e| Entry::listed(scene, e))
-            .collect();
+        let allowed: Vec<&'static Effect> =
+            catalogue::ALL.iter().filter(|e| !without.iter().any(|id| id == e.id)).copied().collect();
+        let (entries, atoms) = shared_work::both(
+            || shared_work::map(&allowed, |effect| Entry::listed(scene, effect)),
+            || open_form::dictionary(scene),
+        );
+        let mut entries: Vec<Entry> = entries.into_iter().flatten().collect();
         let listed = entries.len();
-        let atoms = open_form::dictionary(scene);
         let share = OPEN_LOG_PRIOR - (atoms.len().max(1) as f64).ln();
         entries.extend(atoms.iter().enumerate().map(|(i, atom)| Entry::open(i, atom, share)));
         Self { entries, listed, atoms }
@@ -50,6 +52,9 @@ impl Library {
         set.members.iter().any(|m| m.entry >= self.listed)
     }
 }
+
+/// Whether to stop: asked every second or so of work.
+pub type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 
 /// Weighed hypotheses, each kind best first.
 pub struct Solution {
@@ -86,12 +91,7 @@ pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -
 }
 
 /// As [`solve`], and `None` as soon as `stop` says so: it is asked every second or so of work.
-pub fn solve_unless(
-    scene: &Scene,
-    library: &Library,
-    start: Option<&[AxisNoise; 3]>,
-    stop: &dyn Fn() -> bool,
-) -> Option<Solution> {
+pub fn solve_unless(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>, stop: Stop) -> Option<Solution> {
     let entries = &library.entries;
     let noise_null = search::fit_noise(scene, &scene.residual_ng, start, if start.is_some() { 50 } else { 110 });
     let null = search::weigh_with_own_noise(scene, entries, &Set::default(), &noise_null, 0, 0);
@@ -133,7 +133,7 @@ impl Pool {
         frame: &Frame,
         bank: &Bank,
         noise: [AxisNoise; 3],
-        stop: &dyn Fn() -> bool,
+        stop: Stop,
     ) -> Option<Self> {
         if stop() {
             return None;
@@ -176,20 +176,23 @@ impl Pool {
         scene: &Scene,
         entries: &[Entry],
         count: [usize; 2],
-        stop: &dyn Fn() -> bool,
+        stop: Stop,
     ) -> Option<(Vec<Weighed>, Vec<Weighed>)> {
         let weigh = |sets: Vec<Set>, count: usize| -> Option<Vec<Weighed>> {
             let top = sets.first().map_or(0.0, |s| s.score);
             let worth = top > WORTH_A_REFIT;
             let keep = sets.into_iter().filter(|s| s.score > top - 14.0).take(if worth { count } else { 1 });
             let rounds = if worth { 2 } else { 1 };
-            let mut weighed = keep
-                .map(|s| (!stop()).then(|| search::weigh_with_own_noise(scene, entries, &s, &self.noise, rounds, 40)))
-                .collect::<Option<Vec<Weighed>>>()?;
+            let mut weighed = shared_work::map(&keep.collect::<Vec<Set>>(), |s| {
+                (!stop()).then(|| search::weigh_with_own_noise(scene, entries, s, &self.noise, rounds, 40))
+            })
+            .into_iter()
+            .collect::<Option<Vec<Weighed>>>()?;
             weighed.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
             Some(weighed)
         };
-        Some((weigh(self.listed, count[0])?, weigh(self.opens, count[1])?))
+        let (listed, open) = shared_work::both(|| weigh(self.listed, count[0]), || weigh(self.opens, count[1]));
+        Some((listed?, open?))
     }
 }
 
@@ -198,7 +201,7 @@ fn converged(
     scene: &Scene,
     library: &Library,
     noise_null: &[AxisNoise; 3],
-    stop: &dyn Fn() -> bool,
+    stop: Stop,
 ) -> Option<(Pool, Vec<(usize, f64)>)> {
     let entries = &library.entries;
     let mut noise = *noise_null;
@@ -223,21 +226,22 @@ fn converged(
 
 /// Weighs the best set with one member less, and that again, as long as a member is not needed: what only described slow noise
 /// is found at one noise together with what is real, and every set kept may hold it.
-fn lessen(scene: &Scene, entries: &[Entry], listed: &mut Vec<Weighed>, stop: &dyn Fn() -> bool) -> Option<()> {
+fn lessen(scene: &Scene, entries: &[Entry], listed: &mut Vec<Weighed>, stop: Stop) -> Option<()> {
     loop {
         let Some(best) = listed.first().filter(|best| best.set.members.len() > 1) else { return Some(()) };
         let key = best.set.key();
-        let mut less = Vec::new();
-        for left_out in 0..best.set.members.len() {
-            if stop() {
-                return None;
-            }
+        if stop() {
+            return None;
+        }
+        let without = |left_out: usize| {
             let mut set = best.set.clone();
             set.members.remove(left_out);
-            if !listed.iter().any(|w| w.set.key() == set.key()) {
-                less.push(search::weigh_with_own_noise(scene, entries, &set, &best.noise, 2, 40));
-            }
-        }
+            set
+        };
+        let mut fewer: Vec<Set> = (0..best.set.members.len()).map(without).collect();
+        fewer.retain(|set| !listed.iter().any(|w| w.set.key() == set.key()));
+        let less =
+            shared_work::map(&fewer, |set| search::weigh_with_own_noise(scene, entries, set, &best.noise, 2, 40));
         merge(listed, less);
         if listed.first().is_none_or(|best| best.set.key() == key) {
             return Some(());
@@ -264,9 +268,11 @@ fn polish(scene: &Scene, frame: &Frame, entries: &[Entry], sets: &mut Vec<Set>, 
     sets.retain(|s| s.score > top - 16.0);
     sets.truncate(count);
     if top > WORTH_A_REFIT {
-        for set in sets.iter_mut() {
-            search::refine(scene, frame, entries, set);
-        }
+        *sets = shared_work::map(sets, |set| {
+            let mut set = set.clone();
+            search::refine(scene, frame, entries, &mut set);
+            set
+        });
     }
     sets.sort_by(|a, b| b.score.total_cmp(&a.score));
 }

@@ -51,9 +51,10 @@ fn the_table_of_nulls_agrees_with_the_bootstrap() {
             };
             let case = Case::from_texts(header, &texts).unwrap();
             let prepared = Prepared::new(&case, &Settings::default()).unwrap();
+            let bootstrap = prepared.bootstrap();
             (0..REPLICATES)
                 .into_par_iter()
-                .map(|i| null_table::false_alarm_probability(prepared.replicate(i)))
+                .map(|i| null_table::false_alarm_probability(bootstrap.statistic(i)))
                 .collect::<Vec<f64>>()
         })
         .collect();

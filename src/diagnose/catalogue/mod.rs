@@ -3,7 +3,7 @@
 //! An effect says what series the recording has and the simulation lacks, as linear columns (with the size each
 //! coefficient may have) at given values of its nonlinear parameters. It searches nothing.
 
-use super::design::Raw;
+use super::design::{OnAxis, Raw};
 use super::scene::{Axes, Scene};
 
 pub mod aerodynamic_drag;
@@ -140,6 +140,29 @@ impl Shape {
             }
             Shape::Columns(columns) => columns.clone(),
             Shape::Fixed(axes) => vec![full(axes.clone())],
+        }
+    }
+}
+
+impl Shape {
+    /// The series of every column on the axes it acts on, of sizes times `scale`; a fixed shape is one column of size 1.
+    pub fn on_axes(&self, sizes: &[f64], scale: f64) -> Vec<Vec<OnAxis<'_>>> {
+        match self {
+            Shape::Scalar(series) => {
+                (0..3).map(|axis| vec![OnAxis { axis, series, size: scale * sizes[axis] }]).collect()
+            }
+            Shape::Columns(columns) => columns
+                .iter()
+                .zip(sizes)
+                .map(|(raw, size)| {
+                    let size = scale * size;
+                    let on_axes = raw.iter().enumerate();
+                    on_axes.filter_map(|(axis, s)| Some(OnAxis { axis, series: s.as_ref()?, size })).collect()
+                })
+                .collect(),
+            Shape::Fixed(axes) => {
+                vec![axes.iter().enumerate().map(|(axis, series)| OnAxis { axis, series, size: 1.0 }).collect()]
+            }
         }
     }
 }

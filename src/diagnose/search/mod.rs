@@ -13,9 +13,10 @@ pub use refine::refine;
 pub use weigh::{Weighed, fit_noise, residual, weigh_with_own_noise};
 
 use super::catalogue::{Effect, Shape, Theta};
-use super::design::{Chosen, Column, Frame};
+use super::design::{Chosen, Column, Frame, OnAxis};
 use super::open_form::Atom;
 use super::scene::{Axes, Scene};
+use crate::math::shared_work;
 
 /// Effects in a set at most.
 pub const SET_MAX: usize = 4;
@@ -121,24 +122,34 @@ pub struct Bank<'a> {
     points: Vec<Vec<Whitened>>,
 }
 
-fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64], scale: f64) -> Whitened {
-    let (columns, fixed) = match shape {
-        Shape::Scalar(series) => (frame.scalars(series, &std::array::from_fn(|k| scale * sizes[k])).to_vec(), false),
-        Shape::Columns(raws) => {
-            (raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect(), false)
-        }
-        Shape::Fixed(axes) => (vec![frame.column(&axes.clone().map(Some), 1.0)], true),
+/// Shapes at their points, whitened all at once.
+fn whiten_all(frame: &Frame, points: &[(Theta, &Shape, &[f64])], scale: f64) -> Vec<Whitened> {
+    let shapes: Vec<Vec<Vec<OnAxis>>> = points.iter().map(|(_, shape, sizes)| shape.on_axes(sizes, scale)).collect();
+    let counts: Vec<usize> = shapes.iter().map(Vec::len).collect();
+    let mut columns = frame.columns(&shapes.into_iter().flatten().collect::<Vec<Vec<OnAxis>>>()).into_iter();
+    let whitened = |((theta, shape, _), count): (&(Theta, &Shape, &[f64]), usize)| Whitened {
+        theta: *theta,
+        columns: columns.by_ref().take(count).collect(),
+        fixed: matches!(shape, Shape::Fixed(_)),
     };
-    Whitened { theta, columns, fixed }
+    points.iter().zip(counts).map(whitened).collect()
+}
+
+fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64], scale: f64) -> Whitened {
+    let columns = match shape {
+        Shape::Columns(raws) => raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect(),
+        Shape::Scalar(_) | Shape::Fixed(_) => frame.columns(&shape.on_axes(sizes, scale)),
+    };
+    Whitened { theta, columns, fixed: matches!(shape, Shape::Fixed(_)) }
 }
 
 impl<'a> Bank<'a> {
     /// Whiten all.
     pub fn new(frame: &Frame, entries: &'a [Entry]) -> Self {
-        let points = entries
-            .iter()
-            .map(|e| e.points.iter().map(|(theta, shape)| whiten(frame, *theta, shape, &e.sizes, 1.0)).collect())
-            .collect();
+        let points: Vec<(Theta, &Shape, &[f64])> =
+            entries.iter().flat_map(|e| e.points.iter().map(|(theta, shape)| (*theta, shape, &*e.sizes))).collect();
+        let mut whitened = whiten_all(frame, &points, 1.0).into_iter();
+        let points = entries.iter().map(|e| whitened.by_ref().take(e.points.len()).collect()).collect();
         Self { entries, points }
     }
 }
@@ -326,17 +337,18 @@ pub fn grow(frame: &Frame, bank: &Bank, allowed: &[usize], seeds: Vec<Set>, size
         let mut next: Vec<Set> = Vec::new();
         for set in layer.iter().take(BEAM) {
             let chosen = set.chosen(frame);
-            for &index in allowed {
-                if set.members.iter().any(|m| m.entry == index) || set.members.len() >= size_max {
-                    continue;
+            let more = |index: &usize| {
+                if set.members.iter().any(|m| m.entry == *index) || set.members.len() >= size_max {
+                    return None;
                 }
-                let (gain, member) = best_of_entry(bank, index, &chosen);
+                let (gain, member) = best_of_entry(bank, *index, &chosen);
                 let mut grown = set.clone();
                 grown.members.push(member);
                 grown.members.sort_by_key(|m| m.entry);
                 grown.score = set.score + gain + crowd(grown.members.len()) - crowd(set.members.len());
-                next.push(grown);
-            }
+                Some(grown)
+            };
+            next.extend(shared_work::map(allowed, more).into_iter().flatten());
         }
         distinct(&mut next);
         let best = found.iter().map(|s| s.score).fold(f64::NEG_INFINITY, f64::max);

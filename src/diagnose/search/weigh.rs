@@ -4,6 +4,7 @@ use super::{Entry, Set, refine};
 use crate::diagnose::design::Frame;
 use crate::diagnose::noise::{self, AxisNoise};
 use crate::diagnose::scene::{Axes, Scene};
+use crate::math::shared_work;
 
 /// A set with the noise fitted to what it leaves.
 pub struct Weighed {
@@ -33,9 +34,11 @@ pub fn fit_noise(
     start: Option<&[AxisNoise; 3]>,
     evaluations: usize,
 ) -> [AxisNoise; 3] {
-    std::array::from_fn(|k| {
+    let of_axis = |k: usize| {
         noise::fit(&residual_ng[k], &scene.schedule, &scene.activity[k], start.map(|s| &s[k]), evaluations).noise
-    })
+    };
+    let (x, (y, z)) = shared_work::both(|| of_axis(0), || shared_work::both(|| of_axis(1), || of_axis(2)));
+    [x, y, z]
 }
 
 /// Weigh a set with its own noise: alternately noise and coefficients, `rounds` times.
