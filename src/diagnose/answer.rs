@@ -13,6 +13,9 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Probability that a record without any mismatch scores as high as this one did.
     pub false_alarm_probability: f64,
+    /// The statistic behind it: log posterior odds of the best hypothesis against none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub statistic: Option<f64>,
     /// Where the mismatch is, named or not.
     pub located: Located,
     /// What the simulation lacks, in order of posterior. Empty unless `explained` or `ambiguous`.
@@ -45,6 +48,7 @@ impl Diagnosis {
             case: case.into(),
             verdict: Verdict::Consistent,
             false_alarm_probability,
+            statistic: None,
             located: Located { frame: "body".into(), ..Located::default() },
             effects: Vec::new(),
             alternatives: Vec::new(),
@@ -211,6 +215,12 @@ pub struct Fit {
     pub after: FitLevel,
     /// On data the fit has not seen.
     pub held_out: HeldOut,
+    /// Each attitude predicted from all others, where there are several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out_attitudes: Option<HeldOut>,
+    /// Log evidence by which the effects are above the best placebo: themselves, shifted in time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub above_placebo: Option<f64>,
 }
 
 /// RMS and whitened misfit.
@@ -233,7 +243,7 @@ pub struct HeldOut {
     pub after_rms_ng: [f64; 3],
     /// Share of the excess over the noise that the prediction removes.
     pub excess_removed: f64,
-    /// Gain of the log predictive density.
+    /// Gain of the log predictive density, the error of the fitted amplitudes counted.
     pub log_score_gain: f64,
     /// Its standard error over blocks.
     pub log_score_gain_se: f64,

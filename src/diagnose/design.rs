@@ -241,13 +241,28 @@ impl Normal {
         }
     }
 
+    /// The normal equations of the same columns over this part of a record and another.
+    pub fn and(&self, other: &Normal) -> Normal {
+        Normal { a: &self.a + &other.a, y: &self.y + &other.y }
+    }
+
     /// What the columns explain at most, their sizes free: half the chi square.
     pub fn explained(&self) -> f64 {
+        self.free_fit().map_or(0.0, |(explained, _)| explained)
+    }
+
+    /// The same, with the sizes in units of their priors; `None` where rounding defeats it.
+    pub fn free_fit(&self) -> Option<(f64, DVector<f64>)> {
         let n = self.y.len();
         let jitter = 1e-9 * self.a.diagonal().max().max(1e-300);
-        let half = Cholesky::new(&self.a + DMatrix::identity(n, n) * jitter)
-            .and_then(|c| c.l_dirty().solve_lower_triangular(&self.y));
-        half.map_or(0.0, |h| 0.5 * h.norm_squared())
+        let sizes = Cholesky::new(&self.a + DMatrix::identity(n, n) * jitter)?.solve(&self.y);
+        Some((0.5 * sizes.dot(&self.y), sizes))
+    }
+
+    /// Posterior mean of the sizes in units of their priors.
+    pub fn posterior_mean(&self) -> DVector<f64> {
+        let n = self.y.len();
+        Cholesky::new(&self.a + DMatrix::identity(n, n)).map_or_else(|| DVector::zeros(n), |c| c.solve(&self.y))
     }
 
     /// Log evidence gained by column `i` alone.

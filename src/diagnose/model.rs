@@ -1,18 +1,12 @@
-//! The fitted set: parameters with their joint covariance, and what it predicts of data it has not seen.
+//! The fitted set: parameters with their joint covariance.
 //!
 //! The covariance is that of the linearised joint fit, coefficients and nonlinear parameters together, at the fitted noise.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::answer::HeldOut;
-use super::design::{Chosen, Column, Frame};
-use super::noise::{AxisNoise, Schedule};
+use super::design::{Column, Frame};
 use super::scene::{Axes, Scene};
-use super::search::{self, Entry, Family, Set};
-use crate::math::rms::rms_about_mean;
-
-/// Length of the blocks that are held out in turn, s.
-pub const BLOCK_S: f64 = 21_600.0;
+use super::search::{Entry, Family, Set};
 
 /// A fitted number.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,10 +111,7 @@ const ONSET_LOW: f64 = 5.0;
 /// so that the curvature at the peak says too little.
 fn onset_sigma(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: usize) -> f64 {
     let Family::Listed(effect) = entries[set.members[i].entry].family else { return 0.0 };
-    let others = Set {
-        members: set.members.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, m)| m.clone()).collect(),
-        score: 0.0,
-    };
+    let others = set.without(i);
     let chosen = others.chosen(frame);
     let sizes = set.members[i].sizes(entries);
     let gain_at = |shift: f64| {
@@ -193,7 +184,8 @@ fn joint_covariance(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) 
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
-fn entry_columns(scene: &Scene, entry: &Entry, theta: &super::catalogue::Theta) -> Option<Vec<super::design::Raw>> {
+/// The columns of an entry at values of its nonlinear parameters, before whitening.
+pub fn entry_columns(scene: &Scene, entry: &Entry, theta: &super::catalogue::Theta) -> Option<Vec<super::design::Raw>> {
     match entry.family {
         Family::Listed(effect) => (effect.signature)(scene, theta).map(|s| s.columns()),
         Family::Open(_) => entry.points.get(theta[0] as usize).map(|(_, shape)| shape.columns()),
@@ -216,107 +208,4 @@ fn member_series(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, mov
         }
     }
     Some(sum)
-}
-
-/// One half of the record, as a case of its own.
-struct Half {
-    index: Vec<usize>,
-    frame: Frame,
-}
-
-fn pick(series: &[f64], index: &[usize]) -> Vec<f64> {
-    index.iter().map(|i| series[*i]).collect()
-}
-
-fn half(scene: &Scene, noise: &[AxisNoise; 3], index: Vec<usize>) -> Half {
-    let schedule = Schedule::new(&pick(scene.clock_s(), &index));
-    let sub = |axes: &Axes| -> Axes { std::array::from_fn(|k| pick(&axes[k], &index)) };
-    Half { frame: Frame::new(noise, &schedule, &sub(&scene.activity), &sub(&scene.residual_ng)), index }
-}
-
-/// Predict each half of the alternate blocks from the other. Nonlinear parameters stay as fitted; amplitudes are fitted anew.
-pub fn held_out(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, noise: &[AxisNoise; 3]) -> HeldOut {
-    let clock = scene.clock_s();
-    let block = |i: usize| ((clock[i] - clock[0]) / BLOCK_S) as usize;
-    let n = clock.len();
-    let halves: Vec<Half> =
-        (0..2).map(|side| half(scene, noise, (0..n).filter(|i| block(*i) % 2 == side).collect())).collect();
-    let full = search::residual(scene, frame, entries, set);
-    let mut after: Axes = scene.residual_ng.clone();
-    let mut signal_energy = 0.0;
-    let mut missed_energy = 0.0;
-    let mut block_gain = vec![0.0; block(n - 1) + 1];
-    for side in 0..2 {
-        let (train, test) = (&halves[1 - side], &halves[side]);
-        if train.index.len() < 50 || test.index.len() < 50 {
-            continue;
-        }
-        let predicted = predict(scene, entries, set, train);
-        let on_test = |axes: &Axes| test.frame.column(&std::array::from_fn(|k| Some(pick(&axes[k], &test.index))), 1.0);
-        let p = on_test(&predicted);
-        let fitted: Axes =
-            std::array::from_fn(|k| scene.residual_ng[k].iter().zip(&full[k]).map(|(a, b)| a - b).collect());
-        let s = on_test(&fitted);
-        let missed = s.less(&p, 1.0);
-        signal_energy += s.dot(&s);
-        missed_energy += missed.dot(&missed);
-        let left = test.frame.data.less(&p, 1.0);
-        for k in 0..3 {
-            let (b, a) = (test.frame.data.projected(k, &test.frame), left.projected(k, &test.frame));
-            for (place, i) in test.index.iter().enumerate() {
-                block_gain[block(*i)] += 0.5 * (b[place].powi(2) - a[place].powi(2));
-            }
-            for i in &test.index {
-                after[k][*i] -= predicted[k][*i];
-            }
-        }
-    }
-    let gain: f64 = block_gain.iter().sum();
-    let count = block_gain.len() as f64;
-    let spread = block_gain.iter().map(|g| (g - gain / count).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    HeldOut {
-        scheme: "alternate 6 h blocks".into(),
-        before_rms_ng: std::array::from_fn(|k| rms_about_mean(&scene.residual_ng[k])),
-        after_rms_ng: std::array::from_fn(|k| rms_about_mean(&after[k])),
-        excess_removed: if signal_energy > 0.0 { 1.0 - missed_energy / signal_energy } else { 0.0 },
-        log_score_gain: gain,
-        log_score_gain_se: (spread * count).sqrt(),
-    }
-}
-
-/// The set's series over the whole record with amplitudes fitted to one half.
-fn predict(scene: &Scene, entries: &[Entry], set: &Set, train: &Half) -> Axes {
-    let n = scene.schedule.len();
-    let mut sum: Axes = std::array::from_fn(|_| vec![0.0; n]);
-    let mut linear: Vec<(Column, super::design::Raw, f64)> = Vec::new();
-    let mut fixed: Vec<Column> = Vec::new();
-    for m in &set.members {
-        let Some(raws) = entry_columns(scene, &entries[m.entry], &m.theta) else { continue };
-        for j in 0..m.linear().max(1) {
-            let place = m.axis.unwrap_or(j);
-            let raw = raws[place].clone();
-            let part = raw.clone().map(|series| series.map(|s| pick(&s, &train.index)));
-            if m.linear() == 0 {
-                fixed.push(train.frame.column(&part, 1.0));
-                add(&mut sum, &raw, 1.0);
-            } else {
-                let size = m.scale * entries[m.entry].sizes[place];
-                linear.push((train.frame.column(&part, size), raw, size));
-            }
-        }
-    }
-    let chosen = Chosen::new(&train.frame, linear.iter().map(|l| &l.0).collect(), &fixed.iter().collect::<Vec<_>>());
-    let (mean, _) = chosen.posterior();
-    for (value, (_, raw, size)) in mean.iter().zip(&linear) {
-        add(&mut sum, raw, value * size);
-    }
-    sum
-}
-
-fn add(sum: &mut Axes, raw: &super::design::Raw, factor: f64) {
-    for (total, series) in sum.iter_mut().zip(raw) {
-        if let Some(series) = series {
-            total.iter_mut().zip(series).for_each(|(t, x)| *t += factor * x);
-        }
-    }
 }

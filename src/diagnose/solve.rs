@@ -233,12 +233,7 @@ fn lessen(scene: &Scene, entries: &[Entry], listed: &mut Vec<Weighed>, stop: Sto
         if stop() {
             return None;
         }
-        let without = |left_out: usize| {
-            let mut set = best.set.clone();
-            set.members.remove(left_out);
-            set
-        };
-        let mut fewer: Vec<Set> = (0..best.set.members.len()).map(without).collect();
+        let mut fewer: Vec<Set> = (0..best.set.members.len()).map(|i| best.set.without(i)).collect();
         fewer.retain(|set| !listed.iter().any(|w| w.set.key() == set.key()));
         let less =
             shared_work::map(&fewer, |set| search::weigh_with_own_noise(scene, entries, set, &best.noise, 2, 40));

@@ -14,6 +14,9 @@ pub struct Answer {
     /// Probability of as much in a record without mismatch.
     #[serde(default)]
     pub false_alarm_probability: Option<f64>,
+    /// The statistic behind it.
+    #[serde(default)]
+    pub statistic: Option<f64>,
     /// Named effects, in order.
     #[serde(default)]
     pub effects: Vec<Named>,

@@ -39,6 +39,8 @@ pub struct Score {
     pub mean_set_size: Option<f64>,
     /// Share of the held-out excess over the noise removed, SNR 20 and more: as reported (median), and by the true noise floor, pooled.
     pub excess_removed: Option<[f64; 2]>,
+    /// The statistic that shares of the cases without mismatch reach: (share, statistic), what a table of nulls is made of.
+    pub null_statistics: Vec<(f64, f64)>,
     /// Time per case, s: median and 95th percentile.
     pub seconds: [f64; 2],
     /// Truth (id or kind) to first answer (id or verdict) to count.
@@ -57,6 +59,7 @@ pub fn score(outcomes: &[Outcome]) -> Score {
         rates: rates(&answered),
         mean_set_size: mean_set_size(&answered),
         excess_removed: excess_removed(&answered),
+        null_statistics: null_statistics(&answered),
         seconds: seconds(outcomes),
         confusion: confusion(&answered),
     }
@@ -150,6 +153,19 @@ fn excess_removed(all: &[Pair]) -> Option<[f64; 2]> {
     }
     reported.sort_by(f64::total_cmp);
     Some([reported[reported.len() / 2], 1.0 - after / before])
+}
+
+/// Shares of nulls whose statistic is given.
+const NULL_SHARES: [f64; 12] = [0.95, 0.75, 0.5, 0.25, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001];
+
+fn null_statistics(all: &[Pair]) -> Vec<(f64, f64)> {
+    let nulls = all.iter().filter(|p| p.0.effects.is_empty());
+    let mut statistics: Vec<f64> = nulls.filter_map(|p| p.1.statistic).collect();
+    statistics.sort_by(|a, b| b.total_cmp(a));
+    // The statistic of so many of them, or more.
+    let reached = |share: f64| (share * statistics.len() as f64).floor() as usize;
+    let given = NULL_SHARES.into_iter().filter(|share| reached(*share) >= 1);
+    given.map(|share| (share, statistics[reached(share) - 1])).collect()
 }
 
 fn seconds(outcomes: &[Outcome]) -> [f64; 2] {

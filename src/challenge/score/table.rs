@@ -39,6 +39,10 @@ impl fmt::Display for Score {
             median,
             format!("({late:.2} s)")
         )?;
+        if !self.null_statistics.is_empty() {
+            let shares = self.null_statistics.iter().map(|(share, statistic)| format!("{share}: {statistic:.2}"));
+            writeln!(f, "statistic of nulls, share that reaches it: {}", shares.collect::<Vec<String>>().join(", "))?;
+        }
         for (case, reason) in &self.failed {
             writeln!(f, "no answer to {case}: {reason}")?;
         }

@@ -155,6 +155,22 @@ fn held_out(page: &mut String, d: &Diagnosis) {
         short(fit.held_out.log_score_gain),
         short(fit.held_out.log_score_gain_se)
     );
+    if let Some(held) = &fit.left_out_attitudes {
+        let _ = writeln!(
+            page,
+            "<p>Attitudes: {}; log score gained {} ± {}.</p>",
+            escaped(&held.scheme),
+            short(held.log_score_gain),
+            short(held.log_score_gain_se)
+        );
+    }
+    if let Some(above) = fit.above_placebo {
+        let _ = writeln!(
+            page,
+            "<p>Placebo: shifted in time, the same regressors score {} less in log evidence at best.</p>",
+            short(above)
+        );
+    }
 }
 
 fn located(page: &mut String, d: &Diagnosis) {

@@ -13,6 +13,7 @@ fn diagnosis(verdict: Verdict) -> Diagnosis {
         case: "a <case>".into(),
         verdict,
         false_alarm_probability: if explained { 1e-4 } else { 0.4 },
+        statistic: Some(40.0),
         located: Located { axes: vec!["x".into(), "z".into()], frame: "body".into(), ..Located::default() },
         effects: if explained {
             vec![EffectAnswer {
@@ -44,6 +45,8 @@ fn diagnosis(verdict: Verdict) -> Diagnosis {
                 log_score_gain: 118.2,
                 log_score_gain_se: 15.0,
             },
+            left_out_attitudes: None,
+            above_placebo: Some(12.0),
         }),
         upper_limits: vec![UpperLimit { id: "solar_radiation_pressure".into(), limit_ng: 3.1 }],
         separating_observation: None,

@@ -4,11 +4,13 @@
 //! at hand. Sets grow from nothing in a beam, are refined in their nonlinear parameters, and are then weighed each with
 //! the noise fitted to its own residual: slow noise and a slow effect compete on equal terms. It decides nothing.
 
+mod imitate;
 mod refine;
 mod weigh;
 
 use nalgebra::{DMatrix, DVector};
 
+pub use imitate::imitation;
 pub use refine::refine;
 pub use weigh::{Weighed, fit_noise, residual, weigh_with_own_noise};
 
@@ -195,6 +197,19 @@ impl Set {
         let fixed: Vec<&Column> =
             self.members.iter().filter(|m| m.point.fixed).flat_map(|m| &m.point.columns).collect();
         Chosen::new(frame, linear, &fixed)
+    }
+
+    /// The linear columns alone chosen, whatever the data of the frame.
+    pub fn chosen_free(&self, frame: &Frame) -> Chosen<'_> {
+        let linear = self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| &m.point.columns).collect();
+        Chosen::new(frame, linear, &[])
+    }
+
+    /// The set without one of its members.
+    pub fn without(&self, i: usize) -> Set {
+        let mut set = Set { score: 0.0, ..self.clone() };
+        set.members.remove(i);
+        set
     }
 
     /// Log evidence and priors at the noise of the frame.

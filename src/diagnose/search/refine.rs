@@ -17,10 +17,7 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         if free.is_empty() {
             continue;
         }
-        let others = Set {
-            members: set.members.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, m)| m.clone()).collect(),
-            score: 0.0,
-        };
+        let others = set.without(i);
         let chosen = others.chosen(frame);
         let mut theta = set.members[i].theta;
         let scale = set.members[i].scale;

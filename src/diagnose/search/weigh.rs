@@ -1,4 +1,5 @@
-//! A set and the noise, fitted to what the set leaves: slow noise and a slow effect compete on equal terms.
+//! A set and the noise, fitted to what the set leaves and its slow part then marginalised: slow noise and a slow effect compete on
+//! equal terms.
 
 use super::{Entry, Set, refine};
 use crate::diagnose::design::Frame;
@@ -60,6 +61,10 @@ pub fn weigh_with_own_noise(
         set.rewhiten(scene, &frame, entries);
     }
     refine(scene, &frame, entries, &mut set);
-    let log_posterior = frame.log_null + set.score + noise.iter().map(noise::log_prior).sum::<f64>();
+    let left = residual(scene, &frame, entries, &set);
+    let log_posterior = frame.log_null
+        + set.score
+        + noise.iter().map(noise::log_prior_but_slow).sum::<f64>()
+        + noise::slow_part_marginalised(&noise, &left, &scene.schedule, &scene.activity);
     Weighed { set, noise, log_posterior }
 }

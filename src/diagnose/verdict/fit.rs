@@ -2,10 +2,10 @@
 
 use crate::diagnose::answer::{Fit, FitLevel};
 use crate::diagnose::design::Frame;
-use crate::diagnose::model;
 use crate::diagnose::scene::{Axes, Scene};
 use crate::diagnose::search::{self, Set, Weighed};
 use crate::diagnose::solve::Library;
+use crate::diagnose::trial::Tried;
 use crate::math::rms::rms_about_mean;
 
 /// A remaining autocorrelation this unlikely makes the errors wider.
@@ -18,6 +18,7 @@ pub fn fit(
     frame: &Frame,
     weighed: &Weighed,
     set: &Set,
+    tried: Tried,
     notes: &mut Vec<String>,
 ) -> (Fit, f64) {
     let entries = &library.entries;
@@ -41,15 +42,13 @@ pub fn fit(
             ));
         }
     }
-    let held_out = model::held_out(scene, frame, entries, set, &weighed.noise);
-    if !set.members.is_empty() && held_out.log_score_gain <= 0.0 {
-        notes.push("the fit does not predict blocks it has not seen".into());
-    }
     let fit = Fit {
         noise_floor_ng: std::array::from_fn(|k| weighed.noise[k].rms_ng()),
         before: level(&scene.residual_ng, frame, 0.0),
         after: level(&left, &after, used),
-        held_out,
+        held_out: tried.blocks,
+        left_out_attitudes: tried.attitudes,
+        above_placebo: tried.above_placebo,
     };
     (fit, inflation)
 }

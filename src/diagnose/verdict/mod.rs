@@ -3,6 +3,7 @@
 
 mod credible;
 mod fit;
+mod imitators;
 mod limits;
 mod named;
 mod unnamed;
@@ -12,7 +13,7 @@ use self::fit::fit;
 use self::limits::upper_limits;
 use self::named::name;
 use self::unnamed::{hypothesis, of_remains};
-use super::answer::{Diagnosis, Located, Verdict};
+use super::answer::{Diagnosis, HeldOut, Located, Verdict};
 use super::catalogue::Effect;
 use super::design::Frame;
 use super::locate;
@@ -21,11 +22,14 @@ use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{self, Entry, Family, Set, Weighed};
 use super::solve::{Library, Solution};
+use super::trial::{Trial, Tried};
 
 /// Log odds by which an open form must beat the best listed set.
 const OPEN_MARGIN: f64 = 3.0;
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
 const EVIDENCE_SHARE: f64 = 0.8;
+/// Log score that a prediction may lose to what it leaves to chance.
+const PREDICTS: f64 = 2.0;
 /// What remains overturns an explanation when it has more than this share of the energy explained.
 const REMAINS_SHARE: f64 = 0.03;
 
@@ -99,10 +103,19 @@ pub fn conclude(
         Verdict::Unexplained => solution.listed.first(),
         _ => Some(simplest(&listed)),
     };
+    let (verdict, chosen) = match chosen.and_then(|weighed| fails(&tried(scene, library, weighed))) {
+        Some(failure) => {
+            notes.push(failure);
+            (Verdict::Consistent, None)
+        }
+        None => (verdict, chosen),
+    };
     let (verdict, chosen, remains) = with_remains(scene, library, solution, (verdict, chosen), claim);
+    let tried = tried(scene, library, chosen.unwrap_or(&solution.null));
     let least = remains.as_ref().map_or(1.0, |r| r.probability);
     let overall = (probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
-    let mut answer = Diagnosis { verdict, ..Diagnosis::nothing(&scene.case.header.id, overall) };
+    let statistic = Some(solution.statistic());
+    let mut answer = Diagnosis { verdict, statistic, ..Diagnosis::nothing(&scene.case.header.id, overall) };
     answer.located.covariates =
         locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
     let null_frame = Frame::new(&solution.null.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
@@ -113,13 +126,14 @@ pub fn conclude(
             answer.hypothesis = Some(of_remains(&r, ""));
         }
         answer.upper_limits = upper_limits(scene, library, &null_frame, &Set::default());
-        answer.fit = Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), &mut answer.notes).0);
+        answer.fit =
+            Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), tried, &mut answer.notes).0);
         return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder);
     };
     let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
     let mut set = weighed.set.clone();
     set.rewhiten(scene, &frame, &library.entries);
-    let (fit, inflation) = fit(scene, library, &frame, weighed, &set, &mut notes);
+    let (fit, inflation) = fit(scene, library, &frame, weighed, &set, tried, &mut notes);
     let fits = model::parameters(scene, &frame, &library.entries, &set, inflation);
     let contributions = set.contributions(scene, &frame, &library.entries);
     let best = Best { weighed, frame, set, fits, contributions };
@@ -143,6 +157,33 @@ pub fn conclude(
     }
     answer.notes = notes;
     (answer, signal, ladder)
+}
+
+/// A set on trial at its own noise.
+fn tried(scene: &Scene, library: &Library, weighed: &Weighed) -> Tried {
+    let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let mut set = weighed.set.clone();
+    set.rewhiten(scene, &frame, &library.entries);
+    Trial::new(scene, &frame, &library.entries, &set, &weighed.noise).tried()
+}
+
+/// Why a finding does not stand, if it does not: it must predict what it has not seen, and a placebo must not do as well.
+fn fails(tried: &Tried) -> Option<String> {
+    let misleads = |held: &HeldOut| held.log_score_gain < -PREDICTS;
+    if misleads(&tried.blocks) {
+        return Some(format!(
+            "a finding is refused: it does not predict blocks it has not seen (log score {:.1})",
+            tried.blocks.log_score_gain
+        ));
+    }
+    if let Some(held) = tried.attitudes.as_ref().filter(|held| misleads(held)) {
+        return Some(format!(
+            "a finding is refused: it does not predict an attitude it has not seen (log score {:.1})",
+            held.log_score_gain
+        ));
+    }
+    let above = tried.above_placebo.filter(|above| *above < OPEN_MARGIN)?;
+    Some(format!("a finding is refused: shifted in time its regressors score as well (log evidence {above:.1} above)"))
 }
 
 /// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.

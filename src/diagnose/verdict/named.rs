@@ -1,13 +1,16 @@
 //! The effects that are named, what else it could be, and what would decide.
 
+use std::collections::BTreeSet;
+
 use super::credible::{EQUAL, is_nested};
+use super::imitators::imitators;
 use super::{Best, effect_of, ids};
 use crate::diagnose::answer::{Alternative, Diagnosis, EffectAnswer, ParameterAnswer, Verdict};
-use crate::diagnose::catalogue::{self, Effect, Theta};
+use crate::diagnose::catalogue::{self, Effect};
 use crate::diagnose::design::Column;
 use crate::diagnose::scene::Scene;
 use crate::diagnose::search::{Entry, Family, Member, Set, Weighed};
-use crate::diagnose::separating;
+use crate::diagnose::separating::{self, Part, Rival};
 use crate::diagnose::solve::Library;
 use crate::math::rms::rms_about_mean;
 
@@ -31,14 +34,24 @@ pub fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Bes
         .iter()
         .filter(|w| best.weighed.log_posterior - w.log_posterior < RIVAL && !is_nested(&w.set, &best.set))
         .collect();
-    let twin = step_at_mass_change(scene, library, best);
-    if !rivals.is_empty() || twin.is_some() {
+    // Sets that weigh as much, a mass shift taken for a bias step, and what imitates on this record: each once, in this order.
+    let mut contestants: Vec<Rival> = std::iter::once(&best.set)
+        .chain(rivals.iter().map(|w| &w.set))
+        .filter_map(|set| parts(library, set))
+        .chain(step_at_mass_change(scene, library, best))
+        .chain(imitators(library, best))
+        .collect();
+    let mut seen: Vec<BTreeSet<&str>> = Vec::new();
+    contestants.retain(|rival| {
+        let ids: BTreeSet<&str> = rival.iter().map(|part| part.effect.id).collect();
+        let new = !seen.contains(&ids);
+        seen.push(ids);
+        new
+    });
+    if contestants.len() > 1 {
         answer.verdict = Verdict::Ambiguous;
-        answer.cannot_tell_apart.push(ids(library, &best.set));
-        answer.cannot_tell_apart.extend(rivals.iter().map(|w| ids(library, &w.set)));
-        let sets: Vec<&Set> = std::iter::once(&best.set).chain(rivals.iter().map(|w| &w.set)).collect();
-        let contestants = contestants(library, &sets, twin.is_some());
-        answer.cannot_tell_apart.extend(twin);
+        let ids = |rival: &Rival| rival.iter().map(|part| part.effect.id.to_string()).collect();
+        answer.cannot_tell_apart = contestants.iter().map(ids).collect();
         answer.separating_observation = separating::cheapest(scene, &best.weighed.noise, &contestants);
     }
     answer.alternatives = others
@@ -53,55 +66,35 @@ pub fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Bes
         .collect();
 }
 
+/// What a set is made of, `None` where an open form is in it.
+pub fn parts(library: &Library, set: &Set) -> Option<Rival> {
+    let part = |m: &Member| match library.entries[m.entry].family {
+        Family::Listed(effect) => Some(Part { effect, theta: m.theta }),
+        Family::Open(_) => None,
+    };
+    set.members.iter().map(part).collect()
+}
+
 /// The set with its mass shift taken for a bias step at the same instant, when that fits as well: the instant is no
 /// argument for either, since what shifts a mass may shift a bias.
-fn step_at_mass_change(scene: &Scene, library: &Library, best: &Best) -> Option<Vec<String>> {
-    let entries = &library.entries;
-    let i = (0..best.set.members.len())
-        .find(|i| effect_of(entries, &best.set, *i).is_some_and(|e| e.id == "mass_shift"))?;
-    let step =
-        entries[..library.listed].iter().find(|e| matches!(e.family, Family::Listed(e) if e.id == "bias_step"))?;
-    let others = Set {
-        members: best.set.members.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, m)| m.clone()).collect(),
-        score: 0.0,
-    };
+fn step_at_mass_change(scene: &Scene, library: &Library, best: &Best) -> Option<Rival> {
+    let mut rival = parts(library, &best.set)?;
+    let i = rival.iter().position(|part| part.effect.id == "mass_shift")?;
+    let step = catalogue::by_id("bias_step")?;
+    let entry =
+        library.entries[..library.listed].iter().find(|e| matches!(e.family, Family::Listed(e) if e.id == step.id))?;
+    let others = best.set.without(i);
     let chosen = others.chosen(&best.frame);
-    let gain = |entry: &Entry, effect: &Effect, theta: &Theta| {
-        let raws = (effect.signature)(scene, theta).map(|s| s.columns()).unwrap_or_default();
+    let m = &best.set.members[i];
+    let gain = |entry: &Entry, effect: &Effect| {
+        let raws = (effect.signature)(scene, &m.theta).map(|s| s.columns()).unwrap_or_default();
         let columns: Vec<Column> =
             raws.iter().zip(&entry.sizes).map(|(raw, size)| best.frame.column(raw, *size)).collect();
         chosen.normal(&columns).explained()
     };
-    let Family::Listed(step_effect) = step.family else { return None };
-    let m = &best.set.members[i];
-    let shift_effect = effect_of(entries, &best.set, i)?;
-    let lacking = gain(&entries[m.entry], shift_effect, &m.theta) - gain(step, step_effect, &m.theta);
-    (lacking < RIVAL).then(|| {
-        ids(library, &best.set)
-            .into_iter()
-            .map(|id| if id == "mass_shift" { "bias_step".to_string() } else { id })
-            .collect()
-    })
-}
-
-/// The sets that cannot be told apart, best first, for the observation that would separate them; the last one may be the best
-/// with its mass shift taken for a bias step.
-fn contestants(library: &Library, sets: &[&Set], has_twin: bool) -> Vec<separating::Rival> {
-    let part = |m: &Member| match library.entries[m.entry].family {
-        Family::Listed(effect) => Some(separating::Part { effect, theta: m.theta }),
-        Family::Open(_) => None,
-    };
-    let mut rivals: Vec<separating::Rival> =
-        sets.iter().map(|set| set.members.iter().filter_map(part).collect()).collect();
-    if let (true, Some(step)) = (has_twin, catalogue::by_id("bias_step")) {
-        let stepping = |p: &separating::Part| match p.effect.id {
-            "mass_shift" => separating::Part { effect: step, ..p.clone() },
-            _ => p.clone(),
-        };
-        let twin = rivals[0].iter().map(stepping).collect();
-        rivals.push(twin);
-    }
-    rivals
+    let lacking = gain(&library.entries[m.entry], rival[i].effect) - gain(entry, step);
+    rival[i] = Part { effect: step, theta: m.theta };
+    (lacking < RIVAL).then_some(rival)
 }
 
 fn effects(library: &Library, best: &Best, posterior: impl Fn(usize) -> f64) -> Vec<EffectAnswer> {

@@ -1,0 +1,356 @@
+//! The whitening filter: a Kalman filter of three states, linear, the same for data and for every regressor.
+//!
+//! Every step of a filter needs the one before, so that one series after another waits for itself; several are taken side by side.
+
+use super::{AxisNoise, Schedule};
+
+/// Gains of whitening filters side by side, one row a window.
+#[derive(Debug, Clone, Copy)]
+struct Row<const L: usize> {
+    h: [[f64; L]; 2],
+    per_sd: [f64; L],
+    gain: [[f64; L]; 3],
+    decay: [[f64; L]; 2],
+}
+
+/// The Riccati recursion of several noises side by side: covariance of (previous sample noise, short, slow) before a window.
+struct Riccati<'a, const L: usize> {
+    variance: [[f64; L]; 3],
+    tau_s: [[f64; L]; 2],
+    schedule: &'a Schedule,
+    p: [[f64; L]; 6],
+    decay: [[f64; L]; 2],
+    step_before: f64,
+}
+
+impl<'a, const L: usize> Riccati<'a, L> {
+    fn new(noise: &[AxisNoise; L], schedule: &'a Schedule) -> Self {
+        let of = |f: fn(&AxisNoise) -> f64| std::array::from_fn(|l| f(&noise[l]));
+        let variance = [of(|n| n.white_ng.powi(2)), of(|n| n.short_ng.powi(2)), of(|n| n.slow_ng.powi(2))];
+        let none = [0.0; L];
+        Self {
+            variance,
+            tau_s: [of(|n| n.short_tau_s), of(|n| n.slow_tau_s)],
+            schedule,
+            p: [variance[0], none, none, variance[1], none, variance[2]],
+            decay: [none; 2],
+            step_before: f64::NAN,
+        }
+    }
+
+    /// The row of window `i` at activities `s`, and the variances of its innovations; windows in order.
+    #[inline(always)]
+    fn row(&mut self, i: usize, s: [f64; L]) -> (Row<L>, [f64; L]) {
+        let [own, previous] = self.schedule.overlap[i];
+        let step = self.schedule.step_s[i];
+        if step != self.step_before {
+            self.decay = self.tau_s.map(|tau| tau.map(|tau| (-step / tau).exp()));
+            self.step_before = step;
+        }
+        let mut row = Row { h: [[0.0; L]; 2], per_sd: [0.0; L], gain: [[0.0; L]; 3], decay: self.decay };
+        let mut variance = [0.0; L];
+        for l in 0..L {
+            let [vw, v1, v2] = [self.variance[0][l], self.variance[1][l], self.variance[2][l]];
+            let [f1, f2] = [self.decay[0][l], self.decay[1][l]];
+            let (p00, p01, p02) = (self.p[0][l], self.p[1][l] * f1, self.p[2][l] * f2);
+            let p11 = f1 * f1 * (self.p[3][l] - v1) + v1;
+            let p12 = self.p[4][l] * f1 * f2;
+            let p22 = f2 * f2 * (self.p[5][l] - v2) + v2;
+            let (h0, h1) = (s[l] * previous, s[l]);
+            let [c0, c1, c2] = [h0 * p00 + h1 * p01 + p02, h0 * p01 + h1 * p11 + p12, h0 * p02 + h1 * p12 + p22];
+            let ce = s[l] * own * vw;
+            variance[l] = h0 * c0 + h1 * c1 + c2 + s[l] * own * ce;
+            let inverse = 1.0 / variance[l];
+            let gain = [ce * inverse, c1 * inverse, c2 * inverse];
+            self.p[0][l] = vw - ce * gain[0];
+            self.p[1][l] = -ce * gain[1];
+            self.p[2][l] = -ce * gain[2];
+            self.p[3][l] = p11 - c1 * gain[1];
+            self.p[4][l] = p12 - c1 * gain[2];
+            self.p[5][l] = p22 - c2 * gain[2];
+            (row.h[0][l], row.h[1][l], row.per_sd[l]) = (h0, h1, inverse.sqrt());
+            (row.gain[0][l], row.gain[1][l], row.gain[2][l]) = (gain[0], gain[1], gain[2]);
+        }
+        (row, variance)
+    }
+}
+
+/// Sums of logarithms, taken eight factors at a time.
+struct LogSum<const L: usize> {
+    sum: [f64; L],
+    product: [f64; L],
+    count: usize,
+}
+
+impl<const L: usize> LogSum<L> {
+    fn new() -> Self {
+        Self { sum: [0.0; L], product: [1.0; L], count: 0 }
+    }
+
+    fn add(&mut self, x: [f64; L]) {
+        self.product.iter_mut().zip(x).for_each(|(product, x)| *product *= x);
+        self.count += 1;
+        if self.count.is_multiple_of(8) {
+            self.sum.iter_mut().zip(self.product).for_each(|(sum, product)| *sum += product.ln());
+            self.product = [1.0; L];
+        }
+    }
+
+    fn total(self) -> [f64; L] {
+        std::array::from_fn(|l| self.sum[l] + self.product[l].ln())
+    }
+}
+
+/// What filters remember of their series.
+#[derive(Clone, Copy)]
+struct Memory<const L: usize>([[f64; L]; 3]);
+
+impl<const L: usize> Memory<L> {
+    fn new() -> Self {
+        Self([[0.0; L]; 3])
+    }
+
+    /// The whitened innovations of the next values, each filter with the row of its own.
+    #[inline(always)]
+    fn whiten(&mut self, row: &Row<L>, x: [f64; L]) -> [f64; L] {
+        let [z0, z1, z2] = &mut self.0;
+        let mut out = [0.0; L];
+        for l in 0..L {
+            let (one, two) = (z1[l] * row.decay[0][l], z2[l] * row.decay[1][l]);
+            let innovation = x[l] - row.h[0][l] * z0[l] - row.h[1][l] * one - two;
+            z0[l] = row.gain[0][l] * innovation;
+            z1[l] = one + row.gain[1][l] * innovation;
+            z2[l] = two + row.gain[2][l] * innovation;
+            out[l] = innovation * row.per_sd[l];
+        }
+        out
+    }
+
+    /// The same with one filter for all of them.
+    #[inline(always)]
+    fn whiten_alike(&mut self, row: &Row<1>, x: [f64; L]) -> [f64; L] {
+        let [z0, z1, z2] = &mut self.0;
+        let mut out = [0.0; L];
+        for l in 0..L {
+            let (one, two) = (z1[l] * row.decay[0][0], z2[l] * row.decay[1][0]);
+            let innovation = x[l] - row.h[0][0] * z0[l] - row.h[1][0] * one - two;
+            z0[l] = row.gain[0][0] * innovation;
+            z1[l] = one + row.gain[1][0] * innovation;
+            z2[l] = two + row.gain[2][0] * innovation;
+            out[l] = innovation * row.per_sd[0];
+        }
+        out
+    }
+}
+
+/// Windows between two looks at whether all of them are over.
+const CHUNK: usize = 64;
+
+/// Where what a filter remembers of a series is negligible.
+struct Tail {
+    last: usize,
+    largest: f64,
+    quiet: usize,
+    end: Option<usize>,
+}
+
+impl Tail {
+    fn new([first, last]: [usize; 2]) -> Self {
+        // Of a series of zeros nothing is remembered.
+        Self { last, largest: 0.0, quiet: 0, end: (first >= last).then_some(first) }
+    }
+
+    /// Goes on over innovations, the first of which is that of window `at`.
+    fn follow(&mut self, innovations: &[f64], at: usize) {
+        let inside = self.last.saturating_sub(at).min(innovations.len());
+        for w in &innovations[..inside] {
+            let w = w.abs();
+            self.largest = if w > self.largest { w } else { self.largest };
+        }
+        for (i, w) in innovations.iter().enumerate().skip(inside) {
+            if self.end.is_some() {
+                return;
+            }
+            self.quiet = if w.abs() < 1e-5 * self.largest { self.quiet + 1 } else { 0 };
+            self.end = (self.quiet > 8).then_some(at + i + 1);
+        }
+    }
+}
+
+/// The whitening filter of one axis: linear, the same for data and for every regressor.
+#[derive(Debug, Clone)]
+pub struct Whitener {
+    rows: Vec<Row<1>>,
+    log_det: f64,
+}
+
+impl Whitener {
+    /// From the noise, the windows and the activity of each.
+    pub fn new(noise: &AxisNoise, schedule: &Schedule, activity: &[f64]) -> Self {
+        let mut riccati = Riccati::new(&[*noise], schedule);
+        let mut log_det = LogSum::new();
+        let rows = (0..schedule.len())
+            .map(|i| {
+                let (row, variance) = riccati.row(i, [activity[i]]);
+                log_det.add(variance);
+                row
+            })
+            .collect();
+        let [log_det] = log_det.total();
+        Self { rows, log_det }
+    }
+
+    /// Log determinant of the covariance.
+    pub fn log_det(&self) -> f64 {
+        self.log_det
+    }
+
+    /// Whitened innovations of a series at the windows.
+    pub fn whiten(&self, series: &[f64]) -> Vec<f64> {
+        let mut memory = Memory::new();
+        self.rows.iter().zip(series).flat_map(|(row, x)| memory.whiten(row, [*x])).collect()
+    }
+
+    /// Whitened innovations of several series, which are zero outside their own span of windows (first, and one past the last).
+    /// Each answer starts at the first window of its span and ends where what the filter remembers is negligible (1e-5 of its
+    /// largest value).
+    ///
+    /// Side by side, because one after the other waits for itself: every step of a filter needs the one before.
+    pub fn whiten_spans<const L: usize>(&self, series: [&[f64]; L], spans: [[usize; 2]; L]) -> [Vec<f64>; L] {
+        let n = self.rows.len();
+        let begin = spans.iter().map(|span| span[0]).min().unwrap_or(0).min(n);
+        let rest = spans.iter().map(|span| span[1]).max().unwrap_or(n);
+        let series = series.map(|s| &s[..n]);
+        let mut memory = Memory::new();
+        let mut out: [Vec<f64>; L] = std::array::from_fn(|_| Vec::with_capacity(n - begin));
+        let mut tails = spans.map(Tail::new);
+        for chunk in (begin..n).step_by(CHUNK) {
+            let end = (chunk + CHUNK).min(n);
+            let mut values = [[0.0; L]; CHUNK];
+            for (l, series) in series.iter().enumerate() {
+                values.iter_mut().zip(&series[chunk..end]).for_each(|(value, x)| value[l] = *x);
+            }
+            for (value, row) in values.iter_mut().zip(&self.rows[chunk..end]) {
+                *value = memory.whiten_alike(row, *value);
+            }
+            for (l, out) in out.iter_mut().enumerate() {
+                out.extend(values[..end - chunk].iter().map(|value| value[l]));
+            }
+            for (tail, out) in tails.iter_mut().zip(&out).filter(|(tail, _)| tail.last < n) {
+                tail.follow(&out[chunk - begin..], chunk);
+            }
+            if end > rest && tails.iter().all(|tail| tail.end.is_some()) {
+                break;
+            }
+        }
+        for (l, out) in out.iter_mut().enumerate() {
+            out.truncate(tails[l].end.unwrap_or(n).max(begin) - begin);
+            out.drain(..(spans[l][0].min(n) - begin).min(out.len()));
+            out.shrink_to_fit();
+        }
+        out
+    }
+
+    /// Three whole series, each with a filter of its own, in one pass.
+    pub fn whiten_three(filters: &[Whitener; 3], series: [&[f64]; 3]) -> [Vec<f64>; 3] {
+        let n = filters[0].rows.len();
+        let rows = [&filters[0].rows[..n], &filters[1].rows[..n], &filters[2].rows[..n]];
+        let series = series.map(|s| &s[..n]);
+        let mut memory = [Memory::new(); 3];
+        let mut out: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(n));
+        for i in 0..n {
+            for k in 0..3 {
+                out[k].extend(memory[k].whiten(&rows[k][i], [series[k][i]]));
+            }
+        }
+        out
+    }
+
+    /// Predictive standard deviation of every window given those before it.
+    pub fn predictive_sd(&self) -> Vec<f64> {
+        self.rows.iter().map(|row| 1.0 / row.per_sd[0]).collect()
+    }
+}
+
+/// Whitened data and whitened constant in one pass: their products (dd, dc, cc), and the log determinant of the covariance; several
+/// noises side by side, each with data and activity of its own.
+pub(super) fn products<const L: usize>(
+    noise: &[AxisNoise; L],
+    schedule: &Schedule,
+    activity: [&[f64]; L],
+    data: [&[f64]; L],
+) -> [([f64; 3], f64); L] {
+    let n = schedule.len();
+    let (activity, data) = (activity.map(|a| &a[..n]), data.map(|d| &d[..n]));
+    let mut riccati = Riccati::new(noise, schedule);
+    let mut log_det = LogSum::new();
+    let mut memory = [Memory::new(); 2];
+    let mut sums = [[0.0; L]; 3];
+    for i in 0..n {
+        let (row, variance) = riccati.row(i, std::array::from_fn(|l| activity[l][i]));
+        log_det.add(variance);
+        let d = memory[0].whiten(&row, std::array::from_fn(|l| data[l][i]));
+        let c = memory[1].whiten(&row, [1.0; L]);
+        for l in 0..L {
+            sums[0][l] += d[l] * d[l];
+            sums[1][l] += d[l] * c[l];
+            sums[2][l] += c[l] * c[l];
+        }
+    }
+    let log_det = log_det.total();
+    std::array::from_fn(|l| ([sums[0][l], sums[1][l], sums[2][l]], log_det[l]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::noise::simulate;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const NOISE: AxisNoise =
+        AxisNoise { white_ng: 100.0, short_ng: 30.0, short_tau_s: 120.0, slow_ng: 25.0, slow_tau_s: 3600.0 };
+
+    fn record(seed: u64) -> (Schedule, Vec<f64>, Vec<f64>) {
+        let clock: Vec<f64> = (0..2000).filter(|i| i % 190 > 3).map(|i| 25.0 * f64::from(i)).collect();
+        let schedule = Schedule::new(&clock);
+        let activity: Vec<f64> = (0..schedule.len()).map(|i| if i > 700 { 0.6 } else { 1.2 }).collect();
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let x = simulate(&NOISE, &schedule, &activity, || StandardNormal.sample(&mut rng));
+        (schedule, activity, x)
+    }
+
+    #[test]
+    fn series_side_by_side_come_out_as_each_alone() {
+        let (schedule, activity, x) = record(1);
+        let whitener = Whitener::new(&NOISE, &schedule, &activity);
+        let n = schedule.len();
+        // The whole record, a stretch of it, its end, and nothing at all.
+        let spans = [[0, n], [300, 420], [n - 30, n], [n, n]];
+        let series = spans.map(|[first, last]| {
+            (0..n).map(|i| if (first..last).contains(&i) { x[i] } else { 0.0 }).collect::<Vec<f64>>()
+        });
+        let together = whitener.whiten_spans(series.each_ref().map(|s| &s[..]), spans);
+        for ((series, [first, _]), whitened) in series.iter().zip(spans).zip(&together) {
+            let alone = whitener.whiten(series);
+            assert_eq!(whitened[..], alone[first..first + whitened.len()]);
+            let largest = alone.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
+            assert!(alone[first + whitened.len()..].iter().all(|w| w.abs() <= 2e-5 * largest));
+        }
+        assert!(together[1].len() < n - 300 && together[3].is_empty());
+    }
+
+    #[test]
+    fn products_of_several_noises_are_those_of_each() {
+        let (schedule, activity, x) = record(2);
+        let louder = AxisNoise { slow_ng: 60.0, slow_tau_s: 900.0, ..NOISE };
+        let y: Vec<f64> = x.iter().map(|x| x + 40.0).collect();
+        let both = products(&[NOISE, louder], &schedule, [&activity; 2], [&x, &y]);
+        assert_eq!(both[0], products(&[NOISE], &schedule, [&activity], [&x])[0]);
+        assert_eq!(both[1], products(&[louder], &schedule, [&activity], [&y])[0]);
+        let whitener = Whitener::new(&NOISE, &schedule, &activity);
+        let w = whitener.whiten(&x);
+        let energy: f64 = w.iter().map(|w| w * w).sum();
+        assert!((both[0].0[0] / energy - 1.0).abs() < 1e-12 && (both[0].1 - whitener.log_det()).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,264 @@
+//! The noise of the windows, and the filter that whitens it.
+//!
+//! Per axis three parts: white noise of the samples, seen through windows that overlap by half (a moving average, exactly
+//! as the stride has it), a short autoregression (tens of seconds to minutes), both following the crew's activity, and
+//! a slow autoregression (minutes to hours) that does not. The order was chosen so: one autoregression alone either
+//! misses the slow part or takes the overlap for it. State space, so that gaps are simply longer steps.
+//!
+//! The amplitude of the slow part is estimated on a logarithmic scale with a prior: it never reaches zero, and a
+//! record too short to exclude slow noise is treated as having some. That is what keeps false leaks away.
+
+mod filter;
+mod marginal;
+
+pub use filter::Whitener;
+use filter::products;
+pub use marginal::slow_part_marginalised;
+
+use super::optimise::nelder_mead;
+
+/// Noise of one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisNoise {
+    /// White noise of a window, ng, at activity 1.
+    pub white_ng: f64,
+    /// Short autoregression, ng, at activity 1.
+    pub short_ng: f64,
+    /// Its correlation time.
+    pub short_tau_s: f64,
+    /// Slow autoregression, ng.
+    pub slow_ng: f64,
+    /// Its correlation time.
+    pub slow_tau_s: f64,
+}
+
+impl AxisNoise {
+    /// RMS of a window at activity 1.
+    pub fn rms_ng(&self) -> f64 {
+        (self.white_ng.powi(2) + self.short_ng.powi(2) + self.slow_ng.powi(2)).sqrt()
+    }
+}
+
+/// When the windows are and how active the crew was: what the noise depends on beside its parameters.
+#[derive(Debug, Clone)]
+pub struct Schedule {
+    /// Window centres.
+    pub clock_s: Vec<f64>,
+    /// Step to the window before, s; infinite for the first.
+    pub step_s: Vec<f64>,
+    /// Coefficients of the window's own and of the previous sample noise.
+    overlap: Vec<[f64; 2]>,
+}
+
+/// Window length, s: two windows closer than this share samples.
+const WINDOW_S: f64 = 50.0;
+
+impl Schedule {
+    /// From window centres.
+    pub fn new(clock_s: &[f64]) -> Self {
+        let mut step_s = vec![f64::INFINITY];
+        step_s.extend(clock_s.windows(2).map(|w| w[1] - w[0]));
+        let mut own = 1.0_f64;
+        let overlap = step_s
+            .iter()
+            .map(|step| {
+                let shared = (1.0 - step / WINDOW_S).max(0.0);
+                let previous = (shared / own).min(0.999);
+                own = (1.0 - previous * previous).sqrt();
+                [own, previous]
+            })
+            .collect();
+        Self { clock_s: clock_s.to_vec(), step_s, overlap }
+    }
+
+    /// Number of windows.
+    pub fn len(&self) -> usize {
+        self.clock_s.len()
+    }
+
+    /// No windows at all.
+    pub fn is_empty(&self) -> bool {
+        self.clock_s.is_empty()
+    }
+}
+
+/// Activity of every window, from the average deviation in sleep and wake; mean square 1.
+pub fn activity(dev_ng: &[f64], asleep: &[bool]) -> Vec<f64> {
+    let mean = |state: bool| {
+        let (sum, n) = dev_ng
+            .iter()
+            .zip(asleep)
+            .filter(|(_, a)| **a == state)
+            .fold((0.0, 0usize), |(s, n), (d, _)| (s + d, n + 1));
+        (n >= 30).then(|| sum / n as f64)
+    };
+    let level = match (mean(false), mean(true)) {
+        (Some(wake), Some(sleep)) if wake > 0.0 && sleep > 0.0 => [wake, sleep],
+        _ => [1.0, 1.0],
+    };
+    let raw: Vec<f64> = asleep.iter().map(|a| level[usize::from(*a)]).collect();
+    let rms = (raw.iter().map(|x| x * x).sum::<f64>() / raw.len().max(1) as f64).sqrt();
+    raw.iter().map(|x| x / rms).collect()
+}
+
+/// Amplitude at which the prior of the slow part turns down, ng.
+const SLOW_PRIOR_NG: f64 = 10.0;
+/// Longest and shortest correlation time of the slow part, s.
+const SLOW_TAU_S: [f64; 2] = [300.0, 14_400.0];
+
+/// What a fit ends with.
+#[derive(Debug, Clone, Copy)]
+pub struct NoiseFit {
+    /// The noise.
+    pub noise: AxisNoise,
+    /// Log of restricted likelihood times prior.
+    pub log_posterior: f64,
+}
+
+/// Log prior of the noise (densities in the logarithms of its parameters).
+fn log_prior(noise: &AxisNoise) -> f64 {
+    let slow = noise.slow_ng / SLOW_PRIOR_NG;
+    let tau = noise.slow_tau_s.ln();
+    let wall = |x: f64| if x > 0.0 { 0.0 } else { -0.5 * (x / 0.15).powi(2) };
+    log_prior_but_slow(noise)
+        + (slow / (1.0 + slow * slow)).ln()
+        + wall(tau - SLOW_TAU_S[0].ln())
+        + wall(SLOW_TAU_S[1].ln() - tau)
+}
+
+/// The same without that of the slow part.
+pub fn log_prior_but_slow(noise: &AxisNoise) -> f64 {
+    let lognormal = |x: f64, centre: f64, width: f64| -0.5 * ((x / centre).ln() / width).powi(2);
+    lognormal(noise.short_ng / noise.white_ng, 0.2, 0.6) + lognormal(noise.short_tau_s, 100.0, 0.6)
+}
+
+/// Fit the noise of one axis to `residual_ng`, whose constant is nuisance, from `start` if there is one.
+pub fn fit(
+    residual_ng: &[f64],
+    schedule: &Schedule,
+    activity: &[f64],
+    start: Option<&AxisNoise>,
+    evaluations: usize,
+) -> NoiseFit {
+    let n = residual_ng.len() as f64;
+    let mean = residual_ng.iter().sum::<f64>() / n;
+    let rms = (residual_ng.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt().max(1e-6);
+    let noise_of = |p: &[f64]| {
+        let scale = rms * p[4].exp();
+        AxisNoise {
+            white_ng: scale,
+            short_ng: scale * p[0].exp(),
+            short_tau_s: p[1].exp(),
+            slow_ng: scale * p[2].exp(),
+            slow_tau_s: p[3].exp(),
+        }
+    };
+    // The overall scale is profiled: one rescaling step is exact up to the prior of the slow amplitude.
+    let evaluate = |p: &[f64]| {
+        let unit = noise_of(&[p[0], p[1], p[2], p[3], 0.0]);
+        let [([dd, dc, cc], log_det)] = products(&[unit], schedule, [activity], [residual_ng]);
+        let scale2 = (dd - dc * dc / cc) / (n - 1.0);
+        let noise = noise_of(&[p[0], p[1], p[2], p[3], 0.5 * scale2.ln()]);
+        let log_likelihood = -0.5 * (log_det + (n - 1.0) * (scale2.ln() + 1.0) + cc.ln());
+        (noise, log_likelihood + log_prior(&noise))
+    };
+    let begin = match start {
+        Some(s) => {
+            [(s.short_ng / s.white_ng).ln(), s.short_tau_s.ln(), (s.slow_ng / s.white_ng).ln(), s.slow_tau_s.ln()]
+        }
+        None => [0.2_f64.ln(), 100.0_f64.ln(), 0.1_f64.ln(), 3000.0_f64.ln()],
+    };
+    let width = if start.is_some() { [0.25, 0.25, 0.4, 0.4] } else { [0.5, 0.5, 0.8, 0.8] };
+    let best = nelder_mead(&begin, &width, evaluations, |p| {
+        let outside = p
+            .iter()
+            .zip([[-6.0, 1.5], [2.0, 7.0], [-9.0, 4.0], [5.0, 10.5]])
+            .any(|(x, [low, high])| *x < low || *x > high);
+        if outside { f64::INFINITY } else { -evaluate(p).1 }
+    });
+    let (noise, log_posterior) = evaluate(&best);
+    NoiseFit { noise, log_posterior }
+}
+
+/// Dot product.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; 8];
+    let (ca, cb) = (a.chunks_exact(8), b.chunks_exact(8));
+    let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in ca.zip(cb) {
+        for j in 0..8 {
+            lanes[j] += x[j] * y[j];
+        }
+    }
+    lanes.iter().sum::<f64>() + tail
+}
+
+/// A record of noise alone: `normal` gives independent standard normal numbers.
+pub fn simulate(noise: &AxisNoise, schedule: &Schedule, activity: &[f64], mut normal: impl FnMut() -> f64) -> Vec<f64> {
+    let mut previous = noise.white_ng * normal();
+    let mut short = noise.short_ng * normal();
+    let mut slow = noise.slow_ng * normal();
+    (0..schedule.len())
+        .map(|i| {
+            let step = schedule.step_s[i];
+            let [f1, f2] = [(-step / noise.short_tau_s).exp(), (-step / noise.slow_tau_s).exp()];
+            short = f1 * short + (1.0 - f1 * f1).sqrt() * noise.short_ng * normal();
+            slow = f2 * slow + (1.0 - f2 * f2).sqrt() * noise.slow_ng * normal();
+            let own = noise.white_ng * normal();
+            let [a, b] = schedule.overlap[i];
+            let value = activity[i] * (a * own + b * previous + short) + slow;
+            previous = own;
+            value
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cheap source of nearly normal numbers: twelve uniform ones (a linear congruence, Knuth's MMIX constants).
+    fn normals(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        let mut uniform = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
+    fn gappy() -> Schedule {
+        let clock: Vec<f64> = (0..4000).filter(|i| i % 190 > 3).map(|i| 25.0 * f64::from(i)).collect();
+        Schedule::new(&clock)
+    }
+
+    #[test]
+    fn what_the_filter_leaves_of_its_own_noise_is_white_and_of_unit_size_across_gaps_and_levels() {
+        let noise =
+            AxisNoise { white_ng: 100.0, short_ng: 30.0, short_tau_s: 120.0, slow_ng: 25.0, slow_tau_s: 3600.0 };
+        let schedule = gappy();
+        let activity: Vec<f64> = (0..schedule.len()).map(|i| if i > 1500 { 0.6 } else { 1.2 }).collect();
+        let x = simulate(&noise, &schedule, &activity, normals(3));
+        let w = Whitener::new(&noise, &schedule, &activity).whiten(&x);
+        let n = w.len() as f64;
+        let variance = dot(&w, &w) / n;
+        // Five standard errors of a variance and of an autocorrelation.
+        assert!((variance - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "{variance}");
+        for lag in 1..5 {
+            let r = w.iter().zip(&w[lag..]).map(|(a, b)| a * b).sum::<f64>() / n;
+            assert!(r.abs() < 5.0 / n.sqrt(), "lag {lag}: {r}");
+        }
+    }
+
+    #[test]
+    fn the_fit_recovers_white_and_slow_noise() {
+        let noise =
+            AxisNoise { white_ng: 100.0, short_ng: 25.0, short_tau_s: 110.0, slow_ng: 30.0, slow_tau_s: 3000.0 };
+        let schedule = gappy();
+        let activity = vec![1.0; schedule.len()];
+        let x = simulate(&noise, &schedule, &activity, normals(11));
+        let found = fit(&x, &schedule, &activity, None, 150).noise;
+        assert!((found.white_ng / 100.0 - 1.0).abs() < 0.1, "{found:?}");
+        assert!((found.slow_ng / 30.0).ln().abs() < 0.5, "{found:?}");
+    }
+}

@@ -1,0 +1,41 @@
+//! How nearly one effect imitates another on a record: what it leaves of the other's series, noise or no noise.
+
+use super::{Bank, Family};
+use crate::diagnose::catalogue::{Effect, Theta, WHOLE};
+use crate::diagnose::design::{Chosen, Column};
+
+/// An imitation.
+pub struct Imitation {
+    /// Matched-filter SNR of what it leaves.
+    pub left_snr: f64,
+    /// Where in its nonlinear parameters.
+    pub theta: Theta,
+}
+
+/// The best imitation of the data behind `chosen`, beside those chosen, by an entry at a size that can be believed; `whole` is the
+/// data as a column.
+pub fn imitation(bank: &Bank, index: usize, chosen: &Chosen, whole: &Column) -> Option<(&'static Effect, Imitation)> {
+    let entry = &bank.entries[index];
+    let Family::Listed(effect) = entry.family else { return None };
+    let (energy, _) = chosen.left_in(whole);
+    bank.points[index]
+        .iter()
+        .filter_map(|point| {
+            if point.fixed {
+                return Some((energy - 2.0 * chosen.gain_fixed(&point.columns[0]), point.theta));
+            }
+            let normal = chosen.normal(&point.columns);
+            let (explained, sizes) = normal.free_fit()?;
+            let values = sizes.iter().zip(&entry.sizes).map(|(x, size)| x * size);
+            believable(effect, values).then_some((energy - 2.0 * explained, point.theta))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(left, theta)| (effect, Imitation { left_snr: left.max(0.0).sqrt(), theta }))
+}
+
+fn believable(effect: &Effect, mut values: impl Iterator<Item = f64>) -> bool {
+    effect.linear.iter().all(|l| {
+        let value = values.next().unwrap_or(0.0);
+        value.abs() <= l.size_max && (!l.whole || (WHOLE[0]..=WHOLE[1]).contains(&value))
+    })
+}

@@ -1,0 +1,35 @@
+//! Effects that imitate a named one on this record: what they leave of its series is too little to be told, whichever of them the
+//! noise of this one record happens to prefer.
+
+use super::Best;
+use super::named::parts;
+use crate::diagnose::catalogue::full;
+use crate::diagnose::search::{self, Bank};
+use crate::diagnose::separating::{Part, Rival};
+use crate::diagnose::solve::Library;
+
+/// SNR left at which two effects are the same to a record: the data then prefer the wrong one in one record of fifteen.
+const SAME_SNR: f64 = 3.0;
+
+/// The best set with one member taken for its imitator, for every member and every imitator.
+pub fn imitators(library: &Library, best: &Best) -> Vec<Rival> {
+    let bank = Bank::new(&best.frame, &library.entries[..library.listed]);
+    let key = best.set.key();
+    let Some(parts) = parts(library, &best.set) else { return Vec::new() };
+    let mut found = Vec::new();
+    for (i, series) in best.contributions.iter().enumerate() {
+        let frame = best.frame.with_data(series);
+        let whole = frame.column(&full(series.clone()), 1.0);
+        let others = best.set.without(i);
+        let chosen = others.chosen_free(&frame);
+        for index in (0..library.listed).filter(|index| !key.contains(index)) {
+            let imitation = search::imitation(&bank, index, &chosen, &whole);
+            if let Some((effect, imitation)) = imitation.filter(|(_, imitation)| imitation.left_snr < SAME_SNR) {
+                let mut rival = parts.clone();
+                rival[i] = Part { effect, theta: imitation.theta };
+                found.push(rival);
+            }
+        }
+    }
+    found
+}
