@@ -11,6 +11,7 @@ use super::null_table;
 use super::report::{CovariatePlate, Plates};
 use super::scene::{Axes, Scene};
 use super::solve::{Library, Solution, solve};
+use super::tails;
 use super::verdict;
 
 /// How to analyse.
@@ -64,6 +65,8 @@ pub struct Prepared<'a> {
     scene: Scene<'a>,
     library: Library,
     solution: Solution,
+    /// Windows that weigh less because no noise reaches them.
+    stood_out: usize,
     settings: Settings,
 }
 
@@ -76,7 +79,14 @@ impl<'a> Prepared<'a> {
         let scene = Scene::new(case)?;
         let library = Library::new(&scene, &settings.without);
         let solution = solve(&scene, &library, None);
-        Ok(Self { scene, library, solution, settings: settings.clone() })
+        let (scene, solution, stood_out) = match tails::weighted(&scene, &library, &solution) {
+            Some((weighted, count)) => {
+                let solution = solve(&weighted, &library, Some(&solution.null.noise));
+                (weighted, solution, count)
+            }
+            None => (scene, solution, 0),
+        };
+        Ok(Self { scene, library, solution, stood_out, settings: settings.clone() })
     }
 
     /// The bootstrap of this case.
@@ -107,8 +117,13 @@ impl<'a> Prepared<'a> {
             Some(r) if r.least <= self.settings.claim_probability || r.probability > 3.0 * r.least => r.probability,
             _ => table,
         };
-        let (diagnosis, model_ng, ladder) =
+        let (mut diagnosis, model_ng, ladder) =
             verdict::conclude(&self.scene, &self.library, &self.solution, decisive, self.settings.claim_probability);
+        if self.stood_out > 0 {
+            diagnosis
+                .notes
+                .push(format!("{} windows stand out of what is left as no noise does, and weigh less", self.stood_out));
+        }
         Analysis { plates: plates(&self.scene, model_ng, ladder), diagnosis }
     }
 }

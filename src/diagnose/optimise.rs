@@ -7,52 +7,135 @@ pub fn nelder_mead(
     evaluations: usize,
     mut objective: impl FnMut(&[f64]) -> f64,
 ) -> Vec<f64> {
-    let n = start.len();
-    let mut simplex: Vec<(f64, Vec<f64>)> = vec![(objective(start), start.to_vec())];
-    for i in 0..n {
-        let mut p = start.to_vec();
-        p[i] += width[i];
-        simplex.push((objective(&p), p));
+    let mut simplex = Simplex::new(start, width, evaluations);
+    while let Some(point) = simplex.asks() {
+        let value = objective(point);
+        simplex.hears(value);
     }
-    let mut calls = n + 1;
-    while calls < evaluations {
-        simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
-        if simplex[n].0 - simplex[0].0 < 1e-3 {
-            break;
-        }
-        let centre: Vec<f64> = (0..n).map(|j| simplex[..n].iter().map(|s| s.1[j]).sum::<f64>() / n as f64).collect();
-        let towards = |scale: f64, worst: &[f64]| {
-            (0..n).map(|j| centre[j] + scale * (worst[j] - centre[j])).collect::<Vec<f64>>()
-        };
-        let reflected = towards(-1.0, &simplex[n].1);
-        let at_reflected = objective(&reflected);
-        calls += 1;
-        if at_reflected < simplex[0].0 {
-            let expanded = towards(-2.0, &simplex[n].1);
-            let at_expanded = objective(&expanded);
-            calls += 1;
-            simplex[n] = if at_expanded < at_reflected { (at_expanded, expanded) } else { (at_reflected, reflected) };
-        } else if at_reflected < simplex[n - 1].0 {
-            simplex[n] = (at_reflected, reflected);
-        } else {
-            let scale = if at_reflected < simplex[n].0 { -0.5 } else { 0.5 };
-            let contracted = towards(scale, &simplex[n].1);
-            let at_contracted = objective(&contracted);
-            calls += 1;
-            if at_contracted < simplex[n].0.min(at_reflected) {
-                simplex[n] = (at_contracted, contracted);
-            } else {
-                let best = simplex[0].1.clone();
-                for vertex in simplex.iter_mut().skip(1) {
-                    vertex.1 = (0..n).map(|j| 0.5 * (vertex.1[j] + best[j])).collect();
-                    vertex.0 = objective(&vertex.1);
-                    calls += 1;
+    simplex.best()
+}
+
+/// A simplex on its way down: it asks for the value at a point, hears it, and asks for the next. So can several go side by side.
+pub struct Simplex {
+    vertices: Vec<(f64, Vec<f64>)>,
+    width: Vec<f64>,
+    calls: usize,
+    evaluations: usize,
+    asked: Vec<f64>,
+    step: Step,
+}
+
+/// What the value asked for is of.
+enum Step {
+    /// A vertex of the first simplex.
+    First,
+    Reflection,
+    /// Beyond a reflection that was the best.
+    Expansion {
+        reflection: (f64, Vec<f64>),
+    },
+    /// Nearer than a reflection of this value.
+    Contraction {
+        at_reflection: f64,
+    },
+    /// Vertex of a simplex shrunk towards its best.
+    Shrinkage(usize),
+    Done,
+}
+
+impl Simplex {
+    /// From `start` with first steps `width`, at most `evaluations` calls.
+    pub fn new(start: &[f64], width: &[f64], evaluations: usize) -> Self {
+        let (asked, width) = (start.to_vec(), width.to_vec());
+        Self { vertices: Vec::new(), width, calls: 0, evaluations, asked, step: Step::First }
+    }
+
+    /// The point whose value is asked for; none when it is done.
+    pub fn asks(&self) -> Option<&[f64]> {
+        (!matches!(self.step, Step::Done)).then_some(&self.asked)
+    }
+
+    /// Hears the value at the point asked for.
+    pub fn hears(&mut self, value: f64) {
+        let n = self.width.len();
+        self.calls += 1;
+        let asked = std::mem::take(&mut self.asked);
+        match std::mem::replace(&mut self.step, Step::Done) {
+            Step::First => {
+                self.vertices.push((value, asked));
+                let next = self.vertices.len();
+                if next <= n {
+                    self.asked = self.vertices[0].1.clone();
+                    self.asked[next - 1] += self.width[next - 1];
+                    self.step = Step::First;
+                } else {
+                    self.turn();
                 }
             }
+            Step::Reflection if value < self.vertices[0].0 => {
+                self.asked = self.towards(-2.0);
+                self.step = Step::Expansion { reflection: (value, asked) };
+            }
+            Step::Reflection if value < self.vertices[n - 1].0 => {
+                self.vertices[n] = (value, asked);
+                self.turn();
+            }
+            Step::Reflection => {
+                self.asked = self.towards(if value < self.vertices[n].0 { -0.5 } else { 0.5 });
+                self.step = Step::Contraction { at_reflection: value };
+            }
+            Step::Expansion { reflection } => {
+                self.vertices[n] = if value < reflection.0 { (value, asked) } else { reflection };
+                self.turn();
+            }
+            Step::Contraction { at_reflection } => {
+                if value < self.vertices[n].0.min(at_reflection) {
+                    self.vertices[n] = (value, asked);
+                    self.turn();
+                } else {
+                    self.shrink(1);
+                }
+            }
+            Step::Shrinkage(i) => {
+                self.vertices[i] = (value, asked);
+                if i < n { self.shrink(i + 1) } else { self.turn() }
+            }
+            Step::Done => {}
         }
     }
-    simplex.sort_by(|a, b| a.0.total_cmp(&b.0));
-    simplex.swap_remove(0).1
+
+    /// The best point heard of.
+    pub fn best(mut self) -> Vec<f64> {
+        self.vertices.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self.vertices.swap_remove(0).1
+    }
+
+    /// The next iteration, if there is one.
+    fn turn(&mut self) {
+        let n = self.width.len();
+        if self.calls >= self.evaluations {
+            return;
+        }
+        self.vertices.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if self.vertices[n].0 - self.vertices[0].0 >= 1e-3 {
+            self.asked = self.towards(-1.0);
+            self.step = Step::Reflection;
+        }
+    }
+
+    fn shrink(&mut self, i: usize) {
+        let best = &self.vertices[0].1;
+        self.asked = self.vertices[i].1.iter().zip(best).map(|(x, best)| 0.5 * (x + best)).collect();
+        self.step = Step::Shrinkage(i);
+    }
+
+    /// From the centre of all but the worst vertex towards the worst.
+    fn towards(&self, scale: f64) -> Vec<f64> {
+        let n = self.width.len();
+        let centre = |j: usize| self.vertices[..n].iter().map(|v| v.1[j]).sum::<f64>() / n as f64;
+        let worst = &self.vertices[n].1;
+        (0..n).map(|j| centre(j) + scale * (worst[j] - centre(j))).collect()
+    }
 }
 
 #[cfg(test)]

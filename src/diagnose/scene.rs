@@ -204,6 +204,11 @@ impl<'a> Scene<'a> {
         Self { residual_ng, ..self.clone() }
     }
 
+    /// The same scene with the noise of its windows of another level.
+    pub fn with_activity(&self, activity: Axes) -> Self {
+        Self { activity, ..self.clone() }
+    }
+
     /// Window centres.
     pub fn clock_s(&self) -> &[f64] {
         &self.schedule.clock_s

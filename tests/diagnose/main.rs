@@ -1,6 +1,7 @@
 //! The diagnosis on the open cases, and its refusals. Shared data are read where they are; absent, the claim is skipped aloud.
 
 mod separating;
+mod trial;
 
 use std::path::PathBuf;
 

@@ -15,7 +15,7 @@ pub use filter::Whitener;
 use filter::products;
 pub use marginal::slow_part_marginalised;
 
-use super::optimise::nelder_mead;
+use super::optimise::Simplex;
 
 /// Noise of one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,15 +106,6 @@ const SLOW_PRIOR_NG: f64 = 10.0;
 /// Longest and shortest correlation time of the slow part, s.
 const SLOW_TAU_S: [f64; 2] = [300.0, 14_400.0];
 
-/// What a fit ends with.
-#[derive(Debug, Clone, Copy)]
-pub struct NoiseFit {
-    /// The noise.
-    pub noise: AxisNoise,
-    /// Log of restricted likelihood times prior.
-    pub log_posterior: f64,
-}
-
 /// Log prior of the noise (densities in the logarithms of its parameters).
 fn log_prior(noise: &AxisNoise) -> f64 {
     let slow = noise.slow_ng / SLOW_PRIOR_NG;
@@ -132,53 +123,73 @@ pub fn log_prior_but_slow(noise: &AxisNoise) -> f64 {
     lognormal(noise.short_ng / noise.white_ng, 0.2, 0.6) + lognormal(noise.short_tau_s, 100.0, 0.6)
 }
 
-/// Fit the noise of one axis to `residual_ng`, whose constant is nuisance, from `start` if there is one.
-pub fn fit(
-    residual_ng: &[f64],
+/// Fit the noise of several axes side by side, each to its residual, whose constant is nuisance; from `start` if there is one.
+pub fn fit<const L: usize>(
+    residual_ng: [&[f64]; L],
     schedule: &Schedule,
-    activity: &[f64],
-    start: Option<&AxisNoise>,
+    activity: [&[f64]; L],
+    start: Option<[&AxisNoise; L]>,
     evaluations: usize,
-) -> NoiseFit {
-    let n = residual_ng.len() as f64;
-    let mean = residual_ng.iter().sum::<f64>() / n;
-    let rms = (residual_ng.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt().max(1e-6);
-    let noise_of = |p: &[f64]| {
-        let scale = rms * p[4].exp();
-        AxisNoise {
-            white_ng: scale,
-            short_ng: scale * p[0].exp(),
-            short_tau_s: p[1].exp(),
-            slow_ng: scale * p[2].exp(),
-            slow_tau_s: p[3].exp(),
-        }
+) -> [AxisNoise; L] {
+    let n = schedule.len() as f64;
+    let rms_ng = residual_ng.map(|residual| {
+        let mean = residual.iter().sum::<f64>() / n;
+        (residual.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt().max(1e-6)
+    });
+    let noise_of = |p: &[f64], scale_ng: f64| AxisNoise {
+        white_ng: scale_ng,
+        short_ng: scale_ng * p[0].exp(),
+        short_tau_s: p[1].exp(),
+        slow_ng: scale_ng * p[2].exp(),
+        slow_tau_s: p[3].exp(),
     };
     // The overall scale is profiled: one rescaling step is exact up to the prior of the slow amplitude.
-    let evaluate = |p: &[f64]| {
-        let unit = noise_of(&[p[0], p[1], p[2], p[3], 0.0]);
-        let [([dd, dc, cc], log_det)] = products(&[unit], schedule, [activity], [residual_ng]);
-        let scale2 = (dd - dc * dc / cc) / (n - 1.0);
-        let noise = noise_of(&[p[0], p[1], p[2], p[3], 0.5 * scale2.ln()]);
-        let log_likelihood = -0.5 * (log_det + (n - 1.0) * (scale2.ln() + 1.0) + cc.ln());
-        (noise, log_likelihood + log_prior(&noise))
-    };
-    let begin = match start {
-        Some(s) => {
-            [(s.short_ng / s.white_ng).ln(), s.short_tau_s.ln(), (s.slow_ng / s.white_ng).ln(), s.slow_tau_s.ln()]
-        }
-        None => [0.2_f64.ln(), 100.0_f64.ln(), 0.1_f64.ln(), 3000.0_f64.ln()],
+    let evaluate = |points: [&[f64]; L]| {
+        let unit = std::array::from_fn(|l| noise_of(points[l], rms_ng[l]));
+        let found = products(&unit, schedule, activity, residual_ng);
+        std::array::from_fn::<(AxisNoise, f64), L, _>(|l| {
+            let ([dd, dc, cc], log_det) = found[l];
+            let scale2 = (dd - dc * dc / cc) / (n - 1.0);
+            let noise = noise_of(points[l], rms_ng[l] * (0.5 * scale2.ln()).exp());
+            let log_likelihood = -0.5 * (log_det + (n - 1.0) * (scale2.ln() + 1.0) + cc.ln());
+            (noise, log_likelihood + log_prior(&noise))
+        })
     };
     let width = if start.is_some() { [0.25, 0.25, 0.4, 0.4] } else { [0.5, 0.5, 0.8, 0.8] };
-    let best = nelder_mead(&begin, &width, evaluations, |p| {
-        let outside = p
-            .iter()
-            .zip([[-6.0, 1.5], [2.0, 7.0], [-9.0, 4.0], [5.0, 10.5]])
-            .any(|(x, [low, high])| *x < low || *x > high);
-        if outside { f64::INFINITY } else { -evaluate(p).1 }
+    let mut simplexes = std::array::from_fn::<Simplex, L, _>(|l| {
+        let begin = match start.map(|start| start[l]) {
+            Some(s) => {
+                [(s.short_ng / s.white_ng).ln(), s.short_tau_s.ln(), (s.slow_ng / s.white_ng).ln(), s.slow_tau_s.ln()]
+            }
+            None => [0.2_f64.ln(), 100.0_f64.ln(), 0.1_f64.ln(), 3000.0_f64.ln()],
+        };
+        Simplex::new(&begin, &width, evaluations)
     });
-    let (noise, log_posterior) = evaluate(&best);
-    NoiseFit { noise, log_posterior }
+    let is_outside = |p: &[f64]| p.iter().zip(BOUNDS).any(|(x, [low, high])| *x < low || *x > high);
+    loop {
+        for simplex in &mut simplexes {
+            while simplex.asks().is_some_and(is_outside) {
+                simplex.hears(f64::INFINITY);
+            }
+        }
+        if simplexes.iter().all(|simplex| simplex.asks().is_none()) {
+            break;
+        }
+        // A simplex that is done goes along at the middle of its bounds.
+        let values = evaluate(simplexes.each_ref().map(|simplex| simplex.asks().unwrap_or(&MIDDLE)));
+        for (simplex, (_, value)) in simplexes.iter_mut().zip(values) {
+            if simplex.asks().is_some() {
+                simplex.hears(-value);
+            }
+        }
+    }
+    let best = simplexes.map(Simplex::best);
+    evaluate(best.each_ref().map(|p| &p[..])).map(|(noise, _)| noise)
 }
+
+/// Bounds of a fit: logarithms of the short part's share and time, s, and of the slow part's.
+const BOUNDS: [[f64; 2]; 4] = [[-6.0, 1.5], [2.0, 7.0], [-9.0, 4.0], [5.0, 10.5]];
+const MIDDLE: [f64; 4] = [-2.0, 4.5, -2.5, 7.5];
 
 /// Dot product.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -257,7 +268,7 @@ mod tests {
         let schedule = gappy();
         let activity = vec![1.0; schedule.len()];
         let x = simulate(&noise, &schedule, &activity, normals(11));
-        let found = fit(&x, &schedule, &activity, None, 150).noise;
+        let [found] = fit([&x], &schedule, [&activity], None, 150);
         assert!((found.white_ng / 100.0 - 1.0).abs() < 0.1, "{found:?}");
         assert!((found.slow_ng / 30.0).ln().abs() < 0.5, "{found:?}");
     }

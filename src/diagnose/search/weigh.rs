@@ -5,7 +5,6 @@ use super::{Entry, Set, refine};
 use crate::diagnose::design::Frame;
 use crate::diagnose::noise::{self, AxisNoise};
 use crate::diagnose::scene::{Axes, Scene};
-use crate::math::shared_work;
 
 /// A set with the noise fitted to what it leaves.
 pub struct Weighed {
@@ -35,11 +34,8 @@ pub fn fit_noise(
     start: Option<&[AxisNoise; 3]>,
     evaluations: usize,
 ) -> [AxisNoise; 3] {
-    let of_axis = |k: usize| {
-        noise::fit(&residual_ng[k], &scene.schedule, &scene.activity[k], start.map(|s| &s[k]), evaluations).noise
-    };
-    let (x, (y, z)) = shared_work::both(|| of_axis(0), || shared_work::both(|| of_axis(1), || of_axis(2)));
-    [x, y, z]
+    let (residual, activity) = (residual_ng.each_ref().map(|x| &x[..]), scene.activity.each_ref().map(|a| &a[..]));
+    noise::fit(residual, &scene.schedule, activity, start.map(|s| s.each_ref()), evaluations)
 }
 
 /// Weigh a set with its own noise: alternately noise and coefficients, `rounds` times.

@@ -6,14 +6,16 @@ mod fit;
 mod imitators;
 mod limits;
 mod named;
+mod stands;
 mod unnamed;
 
 use self::credible::{credible, simplest};
 use self::fit::fit;
 use self::limits::upper_limits;
 use self::named::name;
+use self::stands::{fails, tried};
 use self::unnamed::{hypothesis, of_remains};
-use super::answer::{Diagnosis, HeldOut, Located, Verdict};
+use super::answer::{Diagnosis, Located, Verdict};
 use super::catalogue::Effect;
 use super::design::Frame;
 use super::locate;
@@ -22,14 +24,11 @@ use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{self, Entry, Family, Set, Weighed};
 use super::solve::{Library, Solution};
-use super::trial::{Trial, Tried};
 
 /// Log odds by which an open form must beat the best listed set.
 const OPEN_MARGIN: f64 = 3.0;
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
 const EVIDENCE_SHARE: f64 = 0.8;
-/// Log score that a prediction may lose to what it leaves to chance.
-const PREDICTS: f64 = 2.0;
 /// What remains overturns an explanation when it has more than this share of the energy explained.
 const REMAINS_SHARE: f64 = 0.03;
 
@@ -157,33 +156,6 @@ pub fn conclude(
     }
     answer.notes = notes;
     (answer, signal, ladder)
-}
-
-/// A set on trial at its own noise.
-fn tried(scene: &Scene, library: &Library, weighed: &Weighed) -> Tried {
-    let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
-    let mut set = weighed.set.clone();
-    set.rewhiten(scene, &frame, &library.entries);
-    Trial::new(scene, &frame, &library.entries, &set, &weighed.noise).tried()
-}
-
-/// Why a finding does not stand, if it does not: it must predict what it has not seen, and a placebo must not do as well.
-fn fails(tried: &Tried) -> Option<String> {
-    let misleads = |held: &HeldOut| held.log_score_gain < -PREDICTS;
-    if misleads(&tried.blocks) {
-        return Some(format!(
-            "a finding is refused: it does not predict blocks it has not seen (log score {:.1})",
-            tried.blocks.log_score_gain
-        ));
-    }
-    if let Some(held) = tried.attitudes.as_ref().filter(|held| misleads(held)) {
-        return Some(format!(
-            "a finding is refused: it does not predict an attitude it has not seen (log score {:.1})",
-            held.log_score_gain
-        ));
-    }
-    let above = tried.above_placebo.filter(|above| *above < OPEN_MARGIN)?;
-    Some(format!("a finding is refused: shifted in time its regressors score as well (log evidence {above:.1} above)"))
 }
 
 /// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.

@@ -1,0 +1,76 @@
+//! Whether a finding stands: it must predict what it has not seen, and a placebo must not do as well.
+
+use crate::diagnose::answer::HeldOut;
+use crate::diagnose::design::Frame;
+use crate::diagnose::scene::Scene;
+use crate::diagnose::search::Weighed;
+use crate::diagnose::solve::Library;
+use crate::diagnose::trial::{Trial, Tried};
+
+/// Log score that a prediction may lose by chance: where the rest of the record says nothing of what is left out it is nought.
+const PREDICTS: f64 = 2.0;
+/// Log evidence by which a finding must be above its placebo: odds of twenty.
+const ABOVE_PLACEBO: f64 = 3.0;
+
+/// A set on trial at its own noise.
+pub fn tried(scene: &Scene, library: &Library, weighed: &Weighed) -> Tried {
+    let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let mut set = weighed.set.clone();
+    set.rewhiten(scene, &frame, &library.entries);
+    Trial::new(scene, &frame, &library.entries, &set, &weighed.noise).tried()
+}
+
+/// Why a finding does not stand, if it does not: it must predict what it has not seen, and a placebo must not do as well.
+pub fn fails(tried: &Tried) -> Option<String> {
+    let misleads = |held: &HeldOut| held.log_score_gain < -PREDICTS;
+    if misleads(&tried.blocks) {
+        return Some(format!(
+            "a finding is refused: it does not predict blocks it has not seen (log score {:.1})",
+            tried.blocks.log_score_gain
+        ));
+    }
+    if let Some(held) = tried.attitudes.as_ref().filter(|held| misleads(held)) {
+        return Some(format!(
+            "a finding is refused: it does not predict an attitude it has not seen (log score {:.1})",
+            held.log_score_gain
+        ));
+    }
+    let above = tried.above_placebo.filter(|above| *above < ABOVE_PLACEBO)?;
+    Some(format!("a finding is refused: shifted in time its regressors score as well (log evidence {above:.1} above)"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn held(log_score_gain: f64) -> HeldOut {
+        HeldOut {
+            scheme: "alternate 6 h blocks".into(),
+            before_rms_ng: [60.0; 3],
+            after_rms_ng: [50.0; 3],
+            excess_removed: 0.9,
+            log_score_gain,
+            log_score_gain_se: 5.0,
+        }
+    }
+
+    #[test]
+    fn a_finding_that_misleads_or_that_a_placebo_matches_is_refused_with_the_figure() {
+        let tried = |blocks, attitudes: Option<f64>, above_placebo| Tried {
+            blocks: held(blocks),
+            attitudes: attitudes.map(held),
+            above_placebo,
+        };
+        assert_eq!(fails(&tried(40.0, Some(12.0), Some(30.0))), None);
+        // One attitude, and no shift that is a placebo.
+        assert_eq!(fails(&tried(40.0, None, None)), None);
+        assert_eq!(fails(&tried(0.0, Some(-0.5), Some(3.5))), None);
+        for (tried, figure) in [
+            (tried(-7.25, Some(12.0), Some(30.0)), "-7.2"),
+            (tried(40.0, Some(-30.0), Some(30.0)), "-30.0"),
+            (tried(40.0, Some(12.0), Some(1.5)), "1.5"),
+        ] {
+            assert!(fails(&tried).is_some_and(|why| why.contains("refused") && why.contains(figure)));
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! A finding on trial, on concealed cases.
+
+use oare_ground::challenge::conceal::{Kind, Order, draw_order};
+use oare_ground::diagnose::answer::Verdict;
+use oare_ground::diagnose::case::{Case, Header, Texts};
+use oare_ground::diagnose::{Analysis, Settings, analyse};
+
+fn files(kind: Kind, seed: u64, only: &'static str) -> Vec<(String, String)> {
+    draw_order(&Order { kind, seed, only: Some(only), other_physics: false }).files
+}
+
+fn case(files: &[(String, String)]) -> Case {
+    let text = |name: &str| files.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone());
+    let texts = Texts {
+        recording: text("recording.csv"),
+        simulation: text("simulation.csv"),
+        ancillary: text("ancillary.csv"),
+        events: text("events.csv"),
+    };
+    Case::from_texts(Header::parse(&text("case.toml").unwrap(), &[]).unwrap(), &texts).unwrap()
+}
+
+fn analysed(case: &Case, bootstraps: usize) -> Analysis {
+    analyse(case, &Settings { bootstraps, ..Settings::default() }).unwrap()
+}
+
+#[test]
+fn a_finding_predicts_an_attitude_left_out_and_its_placebo_does_not_do_as_well() {
+    let case = case(&files(Kind::One, 31, "cg_offset"));
+    let found = analysed(&case, 0).diagnosis;
+    assert_eq!(found.verdict, Verdict::Explained, "{found:?}");
+    let fit = found.fit.unwrap();
+    let attitudes = fit.left_out_attitudes.unwrap();
+    assert!(attitudes.scheme.contains("attitudes left out") && attitudes.log_score_gain > 0.0, "{attitudes:?}");
+    assert!(fit.held_out.log_score_gain > 0.0 && fit.held_out.excess_removed > 0.9, "{:?}", fit.held_out);
+    assert!(fit.above_placebo.unwrap() > 3.0, "{:?}", fit.above_placebo);
+}
+
+#[test]
+fn events_that_all_lie_in_one_half_of_the_long_blocks_are_parted_by_shorter_ones() {
+    let mut files = files(Kind::Clean, 32, "cg_offset");
+    let edit = |files: &mut Vec<(String, String)>, name: &str, lines: &dyn Fn(Vec<&str>) -> Vec<String>| {
+        let text = &mut files.iter_mut().find(|(n, _)| n == name).unwrap().1;
+        *text = lines(text.lines().collect()).join("\n") + "\n";
+    };
+    let clock = |line: &str| line.split(',').next().and_then(|t| t.parse::<f64>().ok());
+    let start = files.iter().find(|(n, _)| n == "recording.csv").unwrap().1.lines().find_map(clock).unwrap();
+    // Two dumps in the third quarter of the first day, both in an even block of six hours.
+    let dumps = [start + 45_000.0, start + 60_000.0];
+    edit(&mut files, "events.csv", &|lines| {
+        let kept = lines.into_iter().filter(|line| !line.contains("water_dump")).map(str::to_string);
+        kept.chain(dumps.map(|t| format!("{t:.1},2000.0,water_dump,"))).collect()
+    });
+    edit(&mut files, "recording.csv", &|lines| {
+        let pushed = |t: f64| dumps.iter().any(|dump| (dump + 30.0..dump + 1970.0).contains(&t));
+        let line = |line: &str| match clock(line).filter(|t| pushed(*t)) {
+            Some(_) => {
+                let mut fields: Vec<String> = line.split(',').map(str::to_string).collect();
+                fields[2] = format!("{:.3}", fields[2].parse::<f64>().unwrap() + 300.0);
+                fields.join(",")
+            }
+            None => line.to_string(),
+        };
+        lines.into_iter().map(line).collect()
+    });
+    let case = case(&files);
+    let found = analysed(&case, 0).diagnosis;
+    let held = found.fit.unwrap().held_out;
+    assert!(held.scheme != "alternate 6 h blocks" && held.excess_removed > 0.5, "{held:?}");
+}
+
+/// The same replicates, however they are screened: what a first look passes over must not reach what is asked about.
+#[test]
+fn the_bootstrap_says_the_same_every_time_and_forbids_nothing_that_is_loud() {
+    let loud = case(&files(Kind::One, 31, "cg_offset"));
+    let probability = || analysed(&loud, 40).diagnosis.false_alarm_probability;
+    let first = probability();
+    assert!(first <= 0.002 / 0.8 && first == probability(), "{first}");
+    let clean = case(&files(Kind::Clean, 31, "cg_offset"));
+    let quiet = analysed(&clean, 40).diagnosis;
+    assert!(quiet.verdict == Verdict::Consistent && quiet.false_alarm_probability > 0.01, "{quiet:?}");
+}
+
+#[test]
+fn a_few_glitches_are_no_finding_and_hide_none() {
+    let glitched = |kind: Kind| {
+        let mut case = case(&files(kind, 31, "cg_offset"));
+        let n = case.recording.clock_s.len();
+        for (j, i) in (0..12).map(|j| (j, (j * 331 + 97) % n)) {
+            case.recording.a_ng[j % 3][i] += if j % 2 == 0 { 1200.0 } else { -900.0 };
+        }
+        analysed(&case, 0).diagnosis
+    };
+    let clean = glitched(Kind::Clean);
+    assert_eq!(clean.verdict, Verdict::Consistent, "{clean:?}");
+    assert!(clean.notes.iter().any(|note| note.contains("stand out")), "{:?}", clean.notes);
+    let (with, without) = (glitched(Kind::One), analysed(&case(&files(Kind::One, 31, "cg_offset")), 0).diagnosis);
+    assert_eq!(with.verdict, Verdict::Explained, "{with:?}");
+    for (a, b) in with.effects[0].parameters.iter().zip(&without.effects[0].parameters) {
+        assert!((a.value - b.value).abs() < 1.0 * b.sigma && a.sigma < 1.2 * b.sigma, "{a:?} {b:?}");
+    }
+}
