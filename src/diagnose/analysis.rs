@@ -11,7 +11,6 @@ use super::null_table;
 use super::report::{CovariatePlate, Plates};
 use super::scene::{Axes, Scene};
 use super::solve::{Library, Solution, solve};
-use super::tails;
 use super::verdict;
 
 /// How to analyse.
@@ -65,8 +64,6 @@ pub struct Prepared<'a> {
     scene: Scene<'a>,
     library: Library,
     solution: Solution,
-    /// Windows that weigh less because no noise reaches them.
-    stood_out: usize,
     settings: Settings,
 }
 
@@ -79,14 +76,7 @@ impl<'a> Prepared<'a> {
         let scene = Scene::new(case)?;
         let library = Library::new(&scene, &settings.without);
         let solution = solve(&scene, &library, None);
-        let (scene, solution, stood_out) = match tails::weighted(&scene, &library, &solution) {
-            Some((weighted, count)) => {
-                let solution = solve(&weighted, &library, Some(&solution.null.noise));
-                (weighted, solution, count)
-            }
-            None => (scene, solution, 0),
-        };
-        Ok(Self { scene, library, solution, stood_out, settings: settings.clone() })
+        Ok(Self { scene, library, solution, settings: settings.clone() })
     }
 
     /// The bootstrap of this case.
@@ -117,13 +107,8 @@ impl<'a> Prepared<'a> {
             Some(r) if r.least <= self.settings.claim_probability || r.probability > 3.0 * r.least => r.probability,
             _ => table,
         };
-        let (mut diagnosis, model_ng, ladder) =
+        let (diagnosis, model_ng, ladder) =
             verdict::conclude(&self.scene, &self.library, &self.solution, decisive, self.settings.claim_probability);
-        if self.stood_out > 0 {
-            diagnosis
-                .notes
-                .push(format!("{} windows stand out of what is left as no noise does, and weigh less", self.stood_out));
-        }
         Analysis { plates: plates(&self.scene, model_ng, ladder), diagnosis }
     }
 }

@@ -21,7 +21,8 @@ pub type Raw = [Option<Vec<f64>>; 3];
 struct Part {
     first: usize,
     whitened: Arc<Vec<f64>>,
-    constant: f64,
+    /// Its products with what is nuisance on this axis.
+    nuisance: Vec<f64>,
     factor: f64,
 }
 
@@ -44,7 +45,8 @@ impl Column {
             } else {
                 0.0
             };
-            sum += a.factor * b.factor * (product - a.constant * b.constant);
+            let nuisance: f64 = a.nuisance.iter().zip(&b.nuisance).map(|(a, b)| a * b).sum();
+            sum += a.factor * b.factor * (product - nuisance);
         }
         sum
     }
@@ -66,30 +68,30 @@ impl Column {
                 None => (b.first, b.first + b.whitened.len()),
             };
             let mut whitened = vec![0.0; end - first];
-            let mut constant = 0.0;
+            let mut nuisance = vec![0.0; b.nuisance.len()];
             let mut add = |part: &Part, factor: f64| {
                 whitened[part.first - first..].iter_mut().zip(&*part.whitened).for_each(|(x, y)| *x += factor * y);
-                constant += factor * part.constant;
+                nuisance.iter_mut().zip(&part.nuisance).for_each(|(x, y)| *x += factor * y);
             };
             if let Some(a) = &*a {
                 add(a, a.factor);
             }
             add(b, -factor * b.factor);
-            *a = Some(Part { first, whitened: Arc::new(whitened), constant, factor: 1.0 });
+            *a = Some(Part { first, whitened: Arc::new(whitened), nuisance, factor: 1.0 });
         }
         out
     }
 
-    /// Whitened values of one axis with the constant's share removed; zero where the column is absent.
+    /// Whitened values of one axis with the share of what is nuisance removed; zero where the column is absent.
     pub fn projected(&self, axis: usize, frame: &Frame) -> Vec<f64> {
-        match &self.parts[axis] {
-            Some(p) => {
-                let value = |i: usize| i.checked_sub(p.first).and_then(|j| p.whitened.get(j)).copied().unwrap_or(0.0);
-                let ones = frame.ones[axis].iter().enumerate();
-                ones.map(|(i, o)| p.factor * (value(i) - p.constant * o)).collect()
-            }
-            None => vec![0.0; frame.ones[axis].len()],
+        let Some(p) = &self.parts[axis] else { return vec![0.0; frame.windows()] };
+        let mut values = vec![0.0; frame.windows()];
+        values[p.first..p.first + p.whitened.len()].copy_from_slice(&p.whitened);
+        for (series, product) in frame.nuisance[axis].iter().zip(&p.nuisance) {
+            values.iter_mut().zip(series).for_each(|(x, u)| *x -= product * u);
         }
+        values.iter_mut().for_each(|x| *x *= p.factor);
+        values
     }
 }
 
@@ -127,8 +129,9 @@ fn span(series: &[f64]) -> [usize; 2] {
 #[derive(Clone)]
 pub struct Frame {
     whiteners: Arc<[Whitener; 3]>,
-    /// The whitened constant of each axis, of unit norm.
-    ones: Arc<Axes>,
+    /// What is nuisance on each axis, whitened: the constant, of unit norm, and the errors all windows share, orthogonal to it and to
+    /// each other, each as far as the data and not its prior decide it.
+    nuisance: Arc<[Vec<Vec<f64>>; 3]>,
     /// Log restricted likelihood but for the data's share.
     log_det: f64,
     /// The whitened residual.
@@ -142,15 +145,21 @@ impl Frame {
     pub fn new(noise: &[AxisNoise; 3], schedule: &Schedule, activity: &Axes, residual_ng: &Axes) -> Self {
         let whiteners: [Whitener; 3] = std::array::from_fn(|k| Whitener::new(&noise[k], schedule, &activity[k]));
         let mut log_det = 0.0;
-        let ones = std::array::from_fn(|k| {
+        let nuisance = std::array::from_fn(|k| {
             let mut one = whiteners[k].whiten(&vec![1.0; schedule.len()]);
             let norm = dot(&one, &one).sqrt();
             one.iter_mut().for_each(|x| *x /= norm);
             log_det -= 0.5 * whiteners[k].log_det() + norm.ln();
-            one
+            let (shared, decided) = shared_errors(&whiteners[k], &one, &schedule.shared_ng[k]);
+            log_det -= decided;
+            std::iter::once(one).chain(shared).collect()
         });
-        let (whiteners, ones) = (Arc::new(whiteners), Arc::new(ones));
-        Self { whiteners, ones, log_det, data: Column::default(), log_null: log_det }.with_data(residual_ng)
+        let (whiteners, nuisance) = (Arc::new(whiteners), Arc::new(nuisance));
+        Self { whiteners, nuisance, log_det, data: Column::default(), log_null: log_det }.with_data(residual_ng)
+    }
+
+    fn windows(&self) -> usize {
+        self.nuisance[0][0].len()
     }
 
     /// The same filters, another residual.
@@ -204,9 +213,9 @@ impl Frame {
     }
 
     fn part(&self, axis: usize, first: usize, whitened: Vec<f64>, size: f64) -> Part {
-        let ones = self.ones[axis].get(first..first + whitened.len()).unwrap_or_default();
-        let constant = dot(&whitened, ones);
-        Part { first, whitened: Arc::new(whitened), constant, factor: size }
+        let products = self.nuisance[axis].iter();
+        let nuisance = products.map(|u| dot(&whitened, &u[first..first + whitened.len()])).collect();
+        Part { first, whitened: Arc::new(whitened), nuisance, factor: size }
     }
 
     /// Whiten a scalar on one axis.
@@ -218,6 +227,36 @@ impl Frame {
     pub fn predictive_sd(&self, axis: usize) -> Vec<f64> {
         self.whiteners[axis].predictive_sd()
     }
+}
+
+/// Whitened errors that all windows share, made orthogonal to the constant and to each other, each by the root of the share of it
+/// that the data decide; and what they take from the log likelihood.
+fn shared_errors(whitener: &Whitener, one: &[f64], shared_ng: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
+    let beside_one = |series: &Vec<f64>| {
+        let mut whitened = whitener.whiten(series);
+        let constant = dot(&whitened, one);
+        whitened.iter_mut().zip(one).for_each(|(x, one)| *x -= constant * one);
+        whitened
+    };
+    let whitened: Vec<Vec<f64>> = shared_ng.iter().map(beside_one).collect();
+    let m = whitened.len();
+    if m == 0 {
+        return (Vec::new(), 0.0);
+    }
+    let eigen = DMatrix::from_fn(m, m, |i, j| dot(&whitened[i], &whitened[j])).symmetric_eigen();
+    let mut decided = 0.0;
+    let mut series = Vec::new();
+    for (j, energy) in eigen.eigenvalues.iter().enumerate().filter(|(_, energy)| **energy > 1e-6) {
+        decided += 0.5 * (1.0 + energy).ln();
+        let scale = (1.0 + energy).sqrt().recip();
+        let mut sum = vec![0.0; one.len()];
+        for (i, w) in whitened.iter().enumerate() {
+            let factor = scale * eigen.eigenvectors[(i, j)];
+            sum.iter_mut().zip(w).for_each(|(sum, w)| *sum += factor * w);
+        }
+        series.push(sum);
+    }
+    (series, decided)
 }
 
 /// Normal equations of columns beside those chosen.
@@ -374,5 +413,36 @@ impl<'a> Chosen<'a> {
             }
             None => (DVector::zeros(0), DMatrix::zeros(0, 0)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of an error that all windows share the data decide the share that their energy has beside its prior, and no column along it
+    /// explains more than what is left.
+    #[test]
+    fn an_error_that_all_windows_share_is_no_finding() {
+        let n = 400;
+        let clock: Vec<f64> = (0..n).map(|i| 25.0 * f64::from(i)).collect();
+        let noise =
+            [AxisNoise { white_ng: 50.0, short_ng: 5.0, short_tau_s: 100.0, slow_ng: 0.5, slow_tau_s: 3000.0 }; 3];
+        let activity: Axes = std::array::from_fn(|_| vec![1.0; clock.len()]);
+        let drift: Vec<f64> = (0..n).map(|i| 40.0 * f64::from(i) / f64::from(n)).collect();
+        // The recording is the drift, two of its own errors large, on y.
+        let residual: Axes =
+            std::array::from_fn(|k| drift.iter().map(|x| if k == 1 { 2.0 * x } else { 0.0 }).collect());
+        let alone = Frame::new(&noise, &Schedule::new(&clock), &activity, &residual);
+        let shared = [Vec::new(), vec![drift.clone()], Vec::new()];
+        let known = Frame::new(&noise, &Schedule::new(&clock).with_shared(shared), &activity, &residual);
+        let column = |frame: &Frame| frame.scalar(1, &drift, 1.0);
+        let (free, bound) = (column(&alone), column(&known));
+        let energy = free.dot(&free);
+        assert!((bound.dot(&bound) - energy / (1.0 + energy)).abs() < 1e-6 * energy, "{energy} {}", bound.dot(&bound));
+        // A drift of 2 is 2^2/2 against the prior of 1 and nothing against the data: the likelihood falls by that and by the volume.
+        let log_ratio = known.log_null - alone.log_null;
+        let expected = 0.5 * 4.0 * energy - 0.5 * 4.0 * energy / (1.0 + energy) - 0.5 * (1.0 + energy).ln();
+        assert!((log_ratio - expected).abs() < 1e-6 * expected.abs(), "{log_ratio} {expected}");
     }
 }

@@ -30,7 +30,6 @@ pub mod search;
 pub mod separating;
 pub mod series;
 pub mod solve;
-pub mod tails;
 pub mod trial;
 pub mod verdict;
 

@@ -2,17 +2,18 @@
 //! or the windows of a station as it stands.
 //!
 //! Only whole windows of normal mode with a calibration around them are used; where the records named a wrong range the
-//! corrected value is. What the bias law leaves undecided is slow and the same in neighbouring windows: the noise model of the
-//! diagnosis carries it as its slow component.
+//! corrected value is. The covariance of the bias law comes along: what it leaves open is slow and the same in all windows, and no
+//! finding.
 
 use std::fmt::Write;
 
-use super::case::{Header, Recording};
+use super::case::{BIAS_ERROR, Header, Recording};
 use crate::ingest::wire::{PlaybackPart, PlaybackReader};
+use crate::pipeline::calibration::{Bias, Calibration, bias_law::PARAMETERS};
 use crate::pipeline::station::{Station, replay};
 use crate::pipeline::window::Window;
 use crate::pipeline::{PlaybackId, Product, Settings};
-use crate::telemetry::{Mode, Quality};
+use crate::telemetry::{Mode, Quality, Range};
 use crate::units::MissionTime;
 
 /// OARE axis of each body axis.
@@ -32,26 +33,66 @@ pub struct Usable {
 /// The windows of a station that a diagnosis may use.
 pub fn usable(station: &Station) -> Usable {
     let mut found = Usable { calibration: station.calibration().map_or(0, |c| c.version), ..Usable::default() };
+    let mut conditions = Vec::new();
     for (window, product) in station.windows().zip(station.products()) {
         let usable = product.quality == Quality::GOOD || product.quality == Quality::RANGE_CORRECTED;
         if usable && product.mode == Mode::Normal && push(&mut found.recording, station, window, product) {
             // Fowler, Noll and Vo's hash, a revision at a time: the windows come in one order.
             found.digest = (found.digest ^ product.revision.0).wrapping_mul(0x0000_0100_0000_01b3);
+            conditions.push((window.centre_s(), window.temperature_c, product.range));
         }
+    }
+    if let Some(calibration) = station.calibration() {
+        found.recording.bias_errors_ng = OARE_AXIS.map(|axis| bias_errors(calibration, axis, &conditions));
     }
     found
 }
+
+/// Clock at the centre of a window, its temperature, C, and the range of each axis.
+type Conditions = (f64, f64, [Option<Range>; 3]);
+
+/// What the bias laws of an OARE axis leave open at the windows, ng: those of one range are nothing to the windows of another.
+fn bias_errors(calibration: &Calibration, axis: usize, windows: &[Conditions]) -> Vec<Vec<f64>> {
+    let mut errors = Vec::new();
+    for range in Range::ALL {
+        let Some(fit) = calibration.bias[axis][range.index()].as_ref().and_then(Bias::fit) else { continue };
+        let ng_per_count =
+            calibration.resolution_ng[axis][range.index()] * calibration.scale[axis][range.index()].correction;
+        let open = fit.open_errors();
+        let at = |(clock_s, temperature_c, ranges): &Conditions| match ranges[axis] == Some(range) {
+            true => open(calibration.time.met_h(*clock_s), *temperature_c).map(|counts| counts * ng_per_count),
+            false => [0.0; PARAMETERS],
+        };
+        let windows: Vec<[f64; PARAMETERS]> = windows.iter().map(at).collect();
+        let series = (0..PARAMETERS).map(|j| windows.iter().map(|w| w[j]).collect::<Vec<f64>>());
+        errors.extend(series.filter(|series| series.iter().any(|x| x.abs() > NEGLIGIBLE_NG)));
+    }
+    errors
+}
+
+/// A bias error that is smaller in every window is left out, ng.
+const NEGLIGIBLE_NG: f64 = 0.05;
 
 /// The windows of a dump in the form of an `acceleration_csv` recording.
 pub fn recording_csv(dump: &[u8], header: &Header) -> String {
     let time = MissionTime { epoch_utc: header.epoch_utc, liftoff_clock_s: header.liftoff_clock_s };
     let settings = Settings { time, ..Settings::sts65() };
     let station = replay(&settings, None, |station| take(station, &settings, dump));
-    let Recording { clock_s, a_ng: [ax, ay, az], dev_ng: [dx, dy, dz] } = usable(&station).recording;
-    let mut csv = String::from("clock_s,ax_ng,ay_ng,az_ng,dev_x_ng,dev_y_ng,dev_z_ng\n");
+    let Recording { clock_s, a_ng: [ax, ay, az], dev_ng: [dx, dy, dz], bias_errors_ng } = usable(&station).recording;
+    let mut csv = String::from("clock_s,ax_ng,ay_ng,az_ng,dev_x_ng,dev_y_ng,dev_z_ng");
+    for (axis, errors) in ["x", "y", "z"].iter().zip(&bias_errors_ng) {
+        (0..errors.len()).for_each(|n| {
+            let _ = write!(csv, ",{BIAS_ERROR}{axis}_{n}");
+        });
+    }
+    csv.push('\n');
     for (i, clock_s) in clock_s.iter().enumerate() {
         let _ =
-            writeln!(csv, "{clock_s:.1},{:.3},{:.3},{:.3},{:.3},{:.3},{:.3}", ax[i], ay[i], az[i], dx[i], dy[i], dz[i]);
+            write!(csv, "{clock_s:.1},{:.3},{:.3},{:.3},{:.3},{:.3},{:.3}", ax[i], ay[i], az[i], dx[i], dy[i], dz[i]);
+        for error in bias_errors_ng.iter().flatten() {
+            let _ = write!(csv, ",{:.3}", error[i]);
+        }
+        csv.push('\n');
     }
     csv
 }

@@ -189,7 +189,7 @@ impl<'a> Scene<'a> {
             std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
         let asleep: Vec<bool> = coverage(windows, &case.spans("crew_sleep")).iter().map(|c| *c > 0.5).collect();
         Self {
-            schedule: Schedule::new(windows),
+            schedule: Schedule::new(windows).with_shared(case.recording.bias_errors_ng.clone()),
             activity: std::array::from_fn(|k| activity(&case.recording.dev_ng[k], &asleep)),
             residual_ng,
             simulated_ng,
@@ -202,11 +202,6 @@ impl<'a> Scene<'a> {
     /// The same scene with another residual: a bootstrap replicate.
     pub fn with_residual(&self, residual_ng: Axes) -> Self {
         Self { residual_ng, ..self.clone() }
-    }
-
-    /// The same scene with the noise of its windows of another level.
-    pub fn with_activity(&self, activity: Axes) -> Self {
-        Self { activity, ..self.clone() }
     }
 
     /// Window centres.

@@ -154,7 +154,9 @@ impl<'a> Trial<'a> {
     }
 
     fn part(&self, index: Vec<usize>) -> Part {
-        let schedule = Schedule::new(&pick(self.scene.clock_s(), &index));
+        let shared = self.scene.schedule.shared_ng.each_ref();
+        let shared = shared.map(|axis| axis.iter().map(|series| pick(series, &index)).collect());
+        let schedule = Schedule::new(&pick(self.scene.clock_s(), &index)).with_shared(shared);
         let sub = |axes: &Axes| -> Axes { std::array::from_fn(|k| pick(&axes[k], &index)) };
         let frame = Frame::new(self.noise, &schedule, &sub(&self.scene.activity), &sub(&self.scene.residual_ng));
         Part { frame, index }

@@ -80,23 +80,3 @@ fn the_bootstrap_says_the_same_every_time_and_forbids_nothing_that_is_loud() {
     let quiet = analysed(&clean, 40).diagnosis;
     assert!(quiet.verdict == Verdict::Consistent && quiet.false_alarm_probability > 0.01, "{quiet:?}");
 }
-
-#[test]
-fn a_few_glitches_are_no_finding_and_hide_none() {
-    let glitched = |kind: Kind| {
-        let mut case = case(&files(kind, 31, "cg_offset"));
-        let n = case.recording.clock_s.len();
-        for (j, i) in (0..12).map(|j| (j, (j * 331 + 97) % n)) {
-            case.recording.a_ng[j % 3][i] += if j % 2 == 0 { 1200.0 } else { -900.0 };
-        }
-        analysed(&case, 0).diagnosis
-    };
-    let clean = glitched(Kind::Clean);
-    assert_eq!(clean.verdict, Verdict::Consistent, "{clean:?}");
-    assert!(clean.notes.iter().any(|note| note.contains("stand out")), "{:?}", clean.notes);
-    let (with, without) = (glitched(Kind::One), analysed(&case(&files(Kind::One, 31, "cg_offset")), 0).diagnosis);
-    assert_eq!(with.verdict, Verdict::Explained, "{with:?}");
-    for (a, b) in with.effects[0].parameters.iter().zip(&without.effects[0].parameters) {
-        assert!((a.value - b.value).abs() < 1.0 * b.sigma && a.sigma < 1.2 * b.sigma, "{a:?} {b:?}");
-    }
-}

@@ -8,6 +8,7 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 pub use header::{Files, Header, Vehicle};
+pub use read::BIAS_ERROR;
 
 use super::error::CaseError;
 
@@ -40,6 +41,8 @@ pub struct Recording {
     pub a_ng: [Vec<f64>; 3],
     /// Average deviation in the window.
     pub dev_ng: [Vec<f64>; 3],
+    /// What the calibration leaves open, per axis: series whose true sizes are independent and standard normal, ng.
+    pub bias_errors_ng: [Vec<Vec<f64>>; 3],
 }
 
 /// What the baseline simulation expects, instantaneous.
@@ -237,6 +240,7 @@ fn take(recording: &Recording, keep: &[usize]) -> Recording {
         clock_s: pick(&recording.clock_s),
         a_ng: std::array::from_fn(|k| pick(&recording.a_ng[k])),
         dev_ng: std::array::from_fn(|k| pick(&recording.dev_ng[k])),
+        bias_errors_ng: recording.bias_errors_ng.each_ref().map(|axis| axis.iter().map(pick).collect()),
     }
 }
 

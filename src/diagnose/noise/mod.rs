@@ -48,6 +48,8 @@ pub struct Schedule {
     pub step_s: Vec<f64>,
     /// Coefficients of the window's own and of the previous sample noise.
     overlap: Vec<[f64; 2]>,
+    /// Errors that all windows share, per axis: series whose sizes are independent and standard normal, ng.
+    pub shared_ng: [Vec<Vec<f64>>; 3],
 }
 
 /// Window length, s: two windows closer than this share samples.
@@ -68,7 +70,12 @@ impl Schedule {
                 [own, previous]
             })
             .collect();
-        Self { clock_s: clock_s.to_vec(), step_s, overlap }
+        Self { clock_s: clock_s.to_vec(), step_s, overlap, shared_ng: Default::default() }
+    }
+
+    /// The same with errors that all windows share.
+    pub fn with_shared(self, shared_ng: [Vec<Vec<f64>>; 3]) -> Self {
+        Self { shared_ng, ..self }
     }
 
     /// Number of windows.

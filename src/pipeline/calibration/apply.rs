@@ -72,6 +72,14 @@ impl Bias {
             Bias::Fitted(fit) => fit.at(met_h, temperature_c),
         }
     }
+
+    /// The fit, where it is one.
+    pub fn fit(&self) -> Option<&BiasFit> {
+        match self {
+            Self::Known(_) => None,
+            Self::Fitted(fit) => Some(fit),
+        }
+    }
 }
 
 /// The scale correction SF_C of one axis and range.

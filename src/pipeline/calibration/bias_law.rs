@@ -117,6 +117,17 @@ impl BiasFit {
         (counts, (variance.max(0.0) + self.drift_variance).sqrt(), outside)
     }
 
+    /// What the covariance leaves open, as independent errors of unit size: the bias each makes at a time, hours since lift-off, and
+    /// a temperature, C, in counts.
+    pub fn open_errors(&self) -> impl Fn(f64, f64) -> [f64; PARAMETERS] + '_ {
+        let covariance = Matrix6::from_fn(|i, j| self.covariance[i][j]);
+        let eigen = covariance.symmetric_eigen();
+        move |met_h, temperature_c| {
+            let g = Vector6::from(Self::gradient(&self.law, met_h, temperature_c));
+            std::array::from_fn(|j| eigen.eigenvalues[j].max(0.0).sqrt() * eigen.eigenvectors.column(j).dot(&g))
+        }
+    }
+
     /// The form that the measurements support, in words.
     pub fn form(&self) -> &'static str {
         let [_, a2, a3, a4, ..] = self.carried;
