@@ -1,8 +1,9 @@
 //! A recording against its simulation: the noise, where they differ, what was left out, how the fit improves.
 //!
 //! The way of a case: [`case`] (read, checked) -> [`scene`] (residual and physics) -> [`noise`] and [`design`] (whitened columns)
-//! -> [`catalogue`] and [`open_form`] (what may be missing) -> [`search`] and [`solve`] (sets, weighed) -> [`null_table`] (how
-//! surprising) -> [`verdict`] with [`model`] and [`locate`] (what is said) -> [`answer`], [`report`].
+//! -> [`catalogue`] and [`open_form`] (what may be missing) -> [`search`] and [`solve`] (sets, weighed) -> [`null_table`] or
+//! [`bootstrap`] (how surprising) -> [`trial`] (does it predict) -> [`verdict`] with [`model`] and [`locate`] (what is said) ->
+//! [`answer`], [`report`].
 
 pub mod analysis;
 pub mod answer;
