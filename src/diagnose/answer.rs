@@ -243,7 +243,8 @@ pub struct HeldOut {
     pub after_rms_ng: [f64; 3],
     /// Share of the excess over the noise that the prediction removes.
     pub excess_removed: f64,
-    /// Gain of the log predictive density, the error of the fitted amplitudes counted.
+    /// Gain of the log predictive density, the error of the fitted amplitudes counted. Where the part fitted says nothing of
+    /// them it is that of their prior; `excess_removed` is then small.
     pub log_score_gain: f64,
     /// Its standard error over blocks.
     pub log_score_gain_se: f64,

@@ -222,11 +222,6 @@ impl Frame {
     pub fn scalar(&self, axis: usize, series: &[f64], size: f64) -> Column {
         self.columns(&[vec![OnAxis { axis, series, size }]]).swap_remove(0)
     }
-
-    /// Predictive standard deviations of an axis.
-    pub fn predictive_sd(&self, axis: usize) -> Vec<f64> {
-        self.whiteners[axis].predictive_sd()
-    }
 }
 
 /// Whitened errors that all windows share, made orthogonal to the constant and to each other, each by the root of the share of it

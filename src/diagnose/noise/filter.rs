@@ -265,11 +265,6 @@ impl Whitener {
         }
         out
     }
-
-    /// Predictive standard deviation of every window given those before it.
-    pub fn predictive_sd(&self) -> Vec<f64> {
-        self.rows.iter().map(|row| 1.0 / row.per_sd[0]).collect()
-    }
 }
 
 /// Whitened data and whitened constant in one pass: their products (dd, dc, cc), and the log determinant of the covariance; several

@@ -125,8 +125,8 @@ pub struct Bank<'a> {
 }
 
 /// Shapes at their points, whitened all at once.
-fn whiten_all(frame: &Frame, points: &[(Theta, &Shape, &[f64])], scale: f64) -> Vec<Whitened> {
-    let shapes: Vec<Vec<Vec<OnAxis>>> = points.iter().map(|(_, shape, sizes)| shape.on_axes(sizes, scale)).collect();
+fn whiten_all(frame: &Frame, points: &[(Theta, &Shape, &[f64])]) -> Vec<Whitened> {
+    let shapes: Vec<Vec<Vec<OnAxis>>> = points.iter().map(|(_, shape, sizes)| shape.on_axes(sizes, 1.0)).collect();
     let counts: Vec<usize> = shapes.iter().map(Vec::len).collect();
     let mut columns = frame.columns(&shapes.into_iter().flatten().collect::<Vec<Vec<OnAxis>>>()).into_iter();
     let whitened = |((theta, shape, _), count): (&(Theta, &Shape, &[f64]), usize)| Whitened {
@@ -150,7 +150,7 @@ impl<'a> Bank<'a> {
     pub fn new(frame: &Frame, entries: &'a [Entry]) -> Self {
         let points: Vec<(Theta, &Shape, &[f64])> =
             entries.iter().flat_map(|e| e.points.iter().map(|(theta, shape)| (*theta, shape, &*e.sizes))).collect();
-        let mut whitened = whiten_all(frame, &points, 1.0).into_iter();
+        let mut whitened = whiten_all(frame, &points).into_iter();
         let points = entries.iter().map(|e| whitened.by_ref().take(e.points.len()).collect()).collect();
         Self { entries, points }
     }

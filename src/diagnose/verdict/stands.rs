@@ -1,4 +1,7 @@
-//! Whether a finding stands: it must predict what it has not seen, and a placebo must not do as well.
+//! Whether a finding stands: what it has not seen must not contradict it, and a placebo must not do as well.
+//!
+//! A part of the record that says nothing of the amplitudes leaves them to their prior, which an effect in the part left out scores
+//! by itself: a finding is refused for a contradiction, not for want of a confirmation.
 
 use crate::diagnose::answer::HeldOut;
 use crate::diagnose::design::Frame;
@@ -7,7 +10,7 @@ use crate::diagnose::search::Weighed;
 use crate::diagnose::solve::Library;
 use crate::diagnose::trial::{Trial, Tried};
 
-/// Log score that a prediction may lose by chance: where the rest of the record says nothing of what is left out it is nought.
+/// Log score that a prediction may lose by chance.
 const PREDICTS: f64 = 2.0;
 /// Log evidence by which a finding must be above its placebo: odds of twenty.
 const ABOVE_PLACEBO: f64 = 3.0;
@@ -20,7 +23,7 @@ pub fn tried(scene: &Scene, library: &Library, weighed: &Weighed) -> Tried {
     Trial::new(scene, &frame, &library.entries, &set, &weighed.noise).tried()
 }
 
-/// Why a finding does not stand, if it does not: it must predict what it has not seen, and a placebo must not do as well.
+/// Why a finding does not stand, if it does not: what it has not seen must not contradict it, and a placebo must not do as well.
 pub fn fails(tried: &Tried) -> Option<String> {
     let misleads = |held: &HeldOut| held.log_score_gain < -PREDICTS;
     if misleads(&tried.blocks) {
