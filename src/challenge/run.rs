@@ -12,7 +12,7 @@ use std::time::Instant;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
-use super::conceal::{Concealed, Kind, Order, draw_order};
+use super::conceal::{Concealed, Kind, Manner, Order, draw_order};
 use super::score::{Answer, Outcome};
 use super::seal::Seal;
 
@@ -43,7 +43,7 @@ const SHARES: [(Kind, usize); 7] = [
 ];
 
 /// So many cases of these kinds, in the usual shares; the seeds of every kind count up from `seed`.
-pub fn plan(cases: usize, seed: u64, kinds: &[Kind], other_physics: bool, only: Option<&'static str>) -> Vec<Order> {
+pub fn plan(cases: usize, seed: u64, kinds: &[Kind], manner: Manner, only: Option<&'static str>) -> Vec<Order> {
     let wanted: Vec<(Kind, usize)> = SHARES.into_iter().filter(|(kind, _)| kinds.contains(kind)).collect();
     let total: usize = wanted.iter().map(|(_, share)| share).sum();
     let mut orders = Vec::with_capacity(cases);
@@ -53,7 +53,7 @@ pub fn plan(cases: usize, seed: u64, kinds: &[Kind], other_physics: bool, only: 
         let lag = |j: &usize| (wanted[*j].1 * k) as f64 / total as f64 - made[*j] as f64;
         let next = (0..wanted.len()).max_by(|a, b| lag(a).total_cmp(&lag(b)));
         let Some(next) = next else { break };
-        orders.push(Order { kind: wanted[next].0, seed: seed + made[next] as u64, only, other_physics });
+        orders.push(Order { kind: wanted[next].0, seed: seed + made[next] as u64, only, manner });
         made[next] += 1;
     }
     orders
@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn any_beginning_of_a_plan_has_its_shares() {
-        let orders = plan(100, 1, &Kind::ALL, false, None);
+        let orders = plan(100, 1, &Kind::ALL, Manner::default(), None);
         for (kind, share) in SHARES {
             assert_eq!(orders.iter().filter(|o| o.kind == kind).count(), share);
             let half = orders[..50].iter().filter(|o| o.kind == kind).count();
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn a_sealed_run_reveals_what_it_committed_to() {
-        let orders = plan(3, 11, &[Kind::Clean, Kind::One], false, None);
+        let orders = plan(3, 11, &[Kind::Clean, Kind::One], Manner::default(), None);
         let progress = ProgressBar::hidden();
         let mut seals = seal(&orders, &progress);
         let outcomes = run(&orders, &seals, &Silent, &progress).unwrap();

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
-use oare_ground::challenge::conceal::{Kind, effect, law};
+use oare_ground::challenge::conceal::{Kind, Manner, effect, law};
 use oare_ground::challenge::engine::Engine;
 use oare_ground::challenge::score::{Outcome, score};
 use oare_ground::challenge::{run, seal};
@@ -28,6 +28,9 @@ pub struct Args {
     /// Winds, density waves and panel areas that the analyser's regressors do not have.
     #[arg(long)]
     other_physics: bool,
+    /// One half window in a hundred is ten times as loud; the SNR does not know of it.
+    #[arg(long)]
+    bursts: bool,
     /// Draw from the real recordings below this folder instead of simulated ones.
     #[arg(long)]
     real: Option<PathBuf>,
@@ -91,7 +94,8 @@ fn concealed(args: &Args, engine: &Engine) -> anyhow::Result<Option<Vec<Outcome>
         (true, Some(id)) if effect::IDS.contains(&id) => vec![Kind::One],
         (true, Some(_)) => vec![Kind::Unknown],
     };
-    let orders = run::plan(args.cases, args.seed, &kinds, args.other_physics, only);
+    let manner = Manner { other_physics: args.other_physics, bursts: args.bursts };
+    let orders = run::plan(args.cases, args.seed, &kinds, manner, only);
     let progress = bar(orders.len(), "sealing");
     let seals = run::seal(&orders, &progress);
     progress.finish_and_clear();

@@ -4,13 +4,14 @@
 
 use super::answer::Diagnosis;
 use super::bootstrap::{Bootstrap, Reached};
+use super::bursts::solve_beside_bursts;
 use super::case::Case;
 use super::error::CaseError;
 use super::noise::AxisNoise;
 use super::null_table;
 use super::report::{CovariatePlate, Plates};
 use super::scene::{Axes, Scene};
-use super::solve::{Library, Solution, solve};
+use super::solve::{Library, Solution};
 use super::verdict;
 
 /// How to analyse.
@@ -73,9 +74,11 @@ impl<'a> Prepared<'a> {
     /// # Errors
     /// As [`analyse`].
     pub fn new(case: &'a Case, settings: &Settings) -> Result<Self, CaseError> {
-        let scene = Scene::new(case)?;
+        let mut scene = Scene::new(case)?;
         let library = Library::new(&scene, &settings.without);
-        let solution = solve(&scene, &library, None);
+        let Some(solution) = solve_beside_bursts(&mut scene, &library, None, &|| false) else {
+            unreachable!("nobody asked to stop")
+        };
         Ok(Self { scene, library, solution, settings: settings.clone() })
     }
 
@@ -87,16 +90,7 @@ impl<'a> Prepared<'a> {
     /// Noise under which the bootstrap is made: that of the best hypothesis, for its residual holds no effect, unless it is larger
     /// than the null's own.
     fn null_noise(&self) -> [AxisNoise; 3] {
-        let best = self
-            .solution
-            .listed
-            .iter()
-            .chain(&self.solution.open)
-            .max_by(|a, b| a.log_posterior.total_cmp(&b.log_posterior));
-        match best {
-            Some(best) if best.log_posterior > self.solution.null.log_posterior => best.noise,
-            _ => self.solution.null.noise,
-        }
+        self.solution.best().noise
     }
 
     /// False-alarm probability, from the bootstrap where there was one, else from the table of nulls, and verdict.

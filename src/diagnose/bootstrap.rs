@@ -49,7 +49,7 @@ pub struct Bootstrap<'a> {
 impl<'a> Bootstrap<'a> {
     /// Replicates of `noise` at the windows of a scene, to be compared with a statistic.
     pub fn new(scene: &'a Scene<'a>, library: &'a Library, noise: [AxisNoise; 3], seed: u64, asked: f64) -> Self {
-        let frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+        let frame = Frame::new(&noise, &scene.schedule, &scene.loudness, &scene.residual_ng);
         let bank = Bank::new(&frame, &library.entries);
         Self { scene, library, noise, seed, frame, bank, asked }
     }
@@ -95,7 +95,7 @@ impl<'a> Bootstrap<'a> {
         let mut rng =
             rand_chacha::ChaCha8Rng::seed_from_u64(self.seed.wrapping_mul(1_000_003).wrapping_add(index as u64));
         std::array::from_fn(|k| {
-            noise::simulate(&self.noise[k], &self.scene.schedule, &self.scene.activity[k], || {
+            noise::simulate(&self.noise[k], &self.scene.schedule, &self.scene.loudness[k], || {
                 StandardNormal.sample(&mut rng)
             })
         })

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::noise::{AxisNoise, Schedule, Whitener, dot};
+use super::noise::{AxisNoise, Loudness, Schedule, Whitener, dot};
 use super::scene::Axes;
 use crate::math::shared_work;
 
@@ -142,8 +142,8 @@ pub struct Frame {
 
 impl Frame {
     /// From the noise of the three axes and the residual.
-    pub fn new(noise: &[AxisNoise; 3], schedule: &Schedule, activity: &Axes, residual_ng: &Axes) -> Self {
-        let whiteners: [Whitener; 3] = std::array::from_fn(|k| Whitener::new(&noise[k], schedule, &activity[k]));
+    pub fn new(noise: &[AxisNoise; 3], schedule: &Schedule, loudness: &[Loudness; 3], residual_ng: &Axes) -> Self {
+        let whiteners: [Whitener; 3] = std::array::from_fn(|k| Whitener::new(&noise[k], schedule, &loudness[k]));
         let mut log_det = 0.0;
         let nuisance = std::array::from_fn(|k| {
             let mut one = whiteners[k].whiten(&vec![1.0; schedule.len()]);
@@ -423,14 +423,14 @@ mod tests {
         let clock: Vec<f64> = (0..n).map(|i| 25.0 * f64::from(i)).collect();
         let noise =
             [AxisNoise { white_ng: 50.0, short_ng: 5.0, short_tau_s: 100.0, slow_ng: 0.5, slow_tau_s: 3000.0 }; 3];
-        let activity: Axes = std::array::from_fn(|_| vec![1.0; clock.len()]);
+        let loudness = std::array::from_fn(|_| Loudness::even(vec![1.0; clock.len()]));
         let drift: Vec<f64> = (0..n).map(|i| 40.0 * f64::from(i) / f64::from(n)).collect();
         // The recording is the drift, two of its own errors large, on y.
         let residual: Axes =
             std::array::from_fn(|k| drift.iter().map(|x| if k == 1 { 2.0 * x } else { 0.0 }).collect());
-        let alone = Frame::new(&noise, &Schedule::new(&clock), &activity, &residual);
+        let alone = Frame::new(&noise, &Schedule::new(&clock), &loudness, &residual);
         let shared = [Vec::new(), vec![drift.clone()], Vec::new()];
-        let known = Frame::new(&noise, &Schedule::new(&clock).with_shared(shared), &activity, &residual);
+        let known = Frame::new(&noise, &Schedule::new(&clock).with_shared(shared), &loudness, &residual);
         let column = |frame: &Frame| frame.scalar(1, &drift, 1.0);
         let (free, bound) = (column(&alone), column(&known));
         let energy = free.dot(&free);

@@ -13,13 +13,14 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::answer::{Diagnosis, Verdict};
+use super::bursts::solve_beside_bursts;
 use super::case::{Case, Expectation, WINDOW_STRIDE_S, WINDOWS_MIN};
 use super::error::CaseError;
 use super::noise::AxisNoise;
 use super::recorder::Usable;
 use super::report;
 use super::scene::{Scene, Surroundings};
-use super::solve::{Library, Stop, solve_unless};
+use super::solve::{Library, Stop};
 use super::{null_table, verdict};
 
 /// Looks kept for readers.
@@ -217,9 +218,9 @@ impl Live {
                 return true;
             }
         };
-        let scene = Scene::within(&case, self.surroundings.clone());
+        let mut scene = Scene::within(&case, self.surroundings.clone());
         let library = Library::new(&scene, &self.policy.without);
-        let Some(solution) = solve_unless(&scene, &library, self.noise.as_ref(), stop) else { return false };
+        let Some(solution) = solve_beside_bursts(&mut scene, &library, self.noise.as_ref(), stop) else { return false };
         self.noise = Some(solution.null.noise);
         let log_odds = solution.statistic();
         let probability = anytime_probability(log_odds);

@@ -8,6 +8,7 @@
 pub mod analysis;
 pub mod answer;
 pub mod bootstrap;
+pub mod bursts;
 pub mod case;
 pub mod catalogue;
 pub mod design;

@@ -1,7 +1,7 @@
 //! Whether structure remains when the best hypothesis has been taken away, even of a form that no dictionary has.
 //!
 //! Two questions to the whitened residual, which is white and independent from axis to axis where the hypothesis is whole:
-//! do the axes move together in some band of periods (Bartlett 1950, the test of a correlation matrix against unity; a push
+//! do the axes move together in some band of periods (the test of a correlation matrix against unity, exact; a push
 //! along one direction of the body at whatever instants does that), and is there a line, of constant or of steadily drifting
 //! period? Not here: what it could be.
 
@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, SymmetricEigen};
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::function::beta::{beta_reg, ln_beta};
 
 use super::case::WINDOW_STRIDE_S;
 use super::scene::Axes;
@@ -18,6 +19,8 @@ const TOGETHER_S: f64 = 400.0;
 /// Shortest period of a line that is looked for, s, and the fewest cycles in the record.
 const LINE_S: f64 = 200.0;
 const CYCLES_MIN: usize = 8;
+/// Lines of the spectrum in the narrowest band in which the axes are compared.
+const LINES_MIN: usize = 4;
 /// Drifts of a line looked for: cycles by which its phase departs from that of a steady one over the record, and their spacing.
 const DRIFT_CYCLES: f64 = 100.0;
 const DRIFT_STEP: f64 = 0.75;
@@ -116,12 +119,26 @@ fn tail(degrees: f64, x: f64) -> f64 {
     ChiSquared::new(degrees).map_or(1.0, |d| d.sf(x))
 }
 
+/// Probability that the correlation matrix of three independent series has a determinant of `x` or less, from so many numbers each.
+///
+/// The determinant is distributed as the product of two beta variables, of (n - 1)/2 and 1/2 and of (n - 2)/2 and 1 (Anderson 2003,
+/// section 9.3): the integral over the first is elementary.
+fn uncorrelated(n: f64, x: f64) -> f64 {
+    let x = x.clamp(0.0, 1.0);
+    let [a, b] = [(n - 1.0) / 2.0, (n - 2.0) / 2.0];
+    if b <= 0.0 {
+        return 1.0;
+    }
+    let beyond = if x > 0.0 { (b * x.ln() - ln_beta(a, 0.5)).exp() * 2.0 * x.sqrt().acos() } else { 0.0 };
+    (beta_reg(a, 0.5, x) + beyond).min(1.0)
+}
+
 /// Do the axes move together in some band?
 fn together(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
     let spectra = grid.spectra(0.0);
     let last = ((grid.span_s() / TOGETHER_S) as usize).min(grid.length() / 2 - 1);
     // Everything slower than a period, and the octaves alone.
-    let edges: Vec<usize> = (0..).map(|i| 16 << i).take_while(|e| *e <= last).collect();
+    let edges: Vec<usize> = (0..).map(|i| LINES_MIN << i).take_while(|e| *e <= last).collect();
     let bands: Vec<[usize; 2]> =
         edges.iter().map(|e| [1, *e]).chain(edges.windows(2).map(|e| [e[0] + 1, e[1]])).collect();
     let mut best: Option<(f64, [usize; 2], Matrix3<f64>, f64)> = None;
@@ -130,11 +147,8 @@ fn together(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
         let r = Matrix3::from_fn(|i, j| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt());
         // Two numbers a line of the spectrum, as far as the windows fill the grid.
         let degrees = 2.0 * (high - low + 1) as f64 * grid.windows / grid.length() as f64;
-        if degrees < 12.0 {
-            continue;
-        }
+        let p = uncorrelated(degrees, r.determinant()) * bands.len() as f64;
         let statistic = -(degrees - 1.0 - 11.0 / 6.0) * r.determinant().max(1e-300).ln();
-        let p = tail(3.0, statistic) * bands.len() as f64;
         if best.as_ref().is_none_or(|b| p < b.0) {
             best = Some((p, [low, high], c, statistic));
         }
@@ -211,6 +225,30 @@ mod tests {
 
     fn clock(n: usize) -> Vec<f64> {
         (0..n).filter(|i| i % 170 > 4).map(|i| 1000.0 + WINDOW_STRIDE_S * i as f64).collect()
+    }
+
+    /// The exact probability against Bartlett's chi square (1950) of three degrees where that is good, and against counting.
+    #[test]
+    fn a_correlation_matrix_near_unity_is_as_probable_as_counted() {
+        for (n, x) in [(60.0, 0.9), (60.0, 0.7), (200.0, 0.9)] {
+            let bartlett = tail(3.0, -(n - 1.0 - 11.0 / 6.0) * f64::ln(x));
+            let exact = uncorrelated(n, x);
+            assert!((exact / bartlett - 1.0).abs() < 0.02, "{n} {x}: {exact} {bartlett}");
+        }
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let determinant = |_| {
+            let m: Matrix3<f64> = (0..8)
+                .map(|_| nalgebra::Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng)))
+                .map(|v: nalgebra::Vector3<f64>| v * v.transpose())
+                .sum();
+            Matrix3::from_fn(|i, j| m[(i, j)] / (m[(i, i)] * m[(j, j)]).sqrt()).determinant()
+        };
+        let drawn: Vec<f64> = (0..20_000).map(determinant).collect();
+        for x in [0.05, 0.2, 0.5] {
+            let share = drawn.iter().filter(|d| **d <= x).count() as f64 / drawn.len() as f64;
+            let expected = uncorrelated(8.0, x);
+            assert!((share - expected).abs() < 4.0 * (expected / drawn.len() as f64).sqrt(), "{x}: {share} {expected}");
+        }
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::units::NANO_G_M_S2;
 use super::case::{Case, Expectation, HALF_WINDOW_S, Header};
 use super::error::CaseError;
 use super::measure::{Measurement, coverage};
-use super::noise::{Schedule, activity};
+use super::noise::{Loudness, Schedule};
 
 /// One series per body axis.
 pub type Axes = [Vec<f64>; 3];
@@ -59,8 +59,8 @@ pub struct Scene<'a> {
     pub case: &'a Case,
     /// Window centres and steps.
     pub schedule: Schedule,
-    /// Activity of each window, per axis.
-    pub activity: Axes,
+    /// How loud each window is, per axis.
+    pub loudness: [Loudness; 3],
     /// Recording less measured simulation, ng.
     pub residual_ng: Axes,
     /// The measured simulation, ng.
@@ -190,7 +190,7 @@ impl<'a> Scene<'a> {
         let asleep: Vec<bool> = coverage(windows, &case.spans("crew_sleep")).iter().map(|c| *c > 0.5).collect();
         Self {
             schedule: Schedule::new(windows).with_shared(case.recording.bias_errors_ng.clone()),
-            activity: std::array::from_fn(|k| activity(&case.recording.dev_ng[k], &asleep)),
+            loudness: std::array::from_fn(|k| Loudness::of_crew(&case.recording.dev_ng[k], &asleep)),
             residual_ng,
             simulated_ng,
             measurement: Measurement::new(&surroundings.grid_s, windows, 0.0),

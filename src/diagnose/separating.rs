@@ -189,7 +189,7 @@ struct Fitted<'a> {
 
 impl<'a> Fitted<'a> {
     fn new(scene: &Scene, noise: &[AxisNoise; 3], rival: &'a Rival) -> Option<Self> {
-        let frame = Frame::new(noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+        let frame = Frame::new(noise, &scene.schedule, &scene.loudness, &scene.residual_ng);
         let mut linear: Vec<Column> = Vec::new();
         let mut fixed: Vec<Column> = Vec::new();
         for part in rival {
@@ -235,7 +235,7 @@ struct Contest {
 impl Contest {
     fn new(scene: &Scene, noise: &[AxisNoise; 3], sets: &[Fitted], turned: Turned) -> Option<Self> {
         let zero: Axes = std::array::from_fn(|_| vec![0.0; scene.schedule.len()]);
-        let frame = Frame::new(noise, &scene.schedule, &scene.activity, &zero);
+        let frame = Frame::new(noise, &scene.schedule, &scene.loudness, &zero);
         let mut predicted = Vec::new();
         let mut free: Vec<Vec<Column>> = Vec::new();
         for set in sets {

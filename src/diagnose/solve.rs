@@ -69,6 +69,12 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// The best hypothesis of all, nothing among them.
+    pub fn best(&self) -> &Weighed {
+        let better = |a: &'_ Weighed, b: &'_ Weighed| b.log_posterior > a.log_posterior;
+        self.listed.iter().chain(&self.open).fold(&self.null, |a, b| if better(a, b) { b } else { a })
+    }
+
     /// Log posterior odds of the best hypothesis against nothing.
     pub fn statistic(&self) -> f64 {
         let best = self.listed.iter().chain(&self.open).map(|w| w.log_posterior).fold(f64::NEG_INFINITY, f64::max);
@@ -100,7 +106,7 @@ pub fn solve_unless(scene: &Scene, library: &Library, start: Option<&[AxisNoise;
     // What the null takes for slow noise may be a slow effect: looked for a second time as if there were no slow noise. Each
     // candidate is weighed with the noise of its own residual as all are.
     if let Some(quiet) = quiet(&noise_null) {
-        let frame = Frame::new(&quiet, &scene.schedule, &scene.activity, &scene.residual_ng);
+        let frame = Frame::new(&quiet, &scene.schedule, &scene.loudness, &scene.residual_ng);
         let pool = Pool::found(scene, library, &frame, &Bank::new(&frame, entries), quiet, stop)?;
         let (more_listed, more_open) = pool.weigh(scene, entries, OWN_NOISE_QUIET, stop)?;
         merge(&mut listed, more_listed);
@@ -208,7 +214,7 @@ fn converged(
     let mut best_key = Vec::new();
     let mut singles = Vec::new();
     for round in 0.. {
-        let frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+        let frame = Frame::new(&noise, &scene.schedule, &scene.loudness, &scene.residual_ng);
         let bank = Bank::new(&frame, entries);
         if round == 0 {
             let nothing = Set::default();

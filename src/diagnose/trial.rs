@@ -158,7 +158,8 @@ impl<'a> Trial<'a> {
         let shared = shared.map(|axis| axis.iter().map(|series| pick(series, &index)).collect());
         let schedule = Schedule::new(&pick(self.scene.clock_s(), &index)).with_shared(shared);
         let sub = |axes: &Axes| -> Axes { std::array::from_fn(|k| pick(&axes[k], &index)) };
-        let frame = Frame::new(self.noise, &schedule, &sub(&self.scene.activity), &sub(&self.scene.residual_ng));
+        let loudness = self.scene.loudness.each_ref().map(|axis| axis.pick(&index));
+        let frame = Frame::new(self.noise, &schedule, &loudness, &sub(&self.scene.residual_ng));
         Part { frame, index }
     }
 

@@ -6,7 +6,7 @@
 #![cfg(feature = "slow")]
 
 use indicatif::ProgressBar;
-use oare_ground::challenge::conceal::{self, Kind};
+use oare_ground::challenge::conceal::{self, Kind, Manner};
 use oare_ground::challenge::engine::Engine;
 use oare_ground::challenge::{run, score, seal};
 use oare_ground::diagnose::Settings;
@@ -80,7 +80,7 @@ fn the_table_of_nulls_agrees_with_the_bootstrap() {
 
 #[test]
 fn sixty_concealed_cases_refute_no_aim() {
-    let orders = run::plan(60, SEED, &Kind::ALL, false, None);
+    let orders = run::plan(60, SEED, &Kind::ALL, Manner::default(), None);
     let progress = ProgressBar::hidden();
     let seals = run::seal(&orders, &progress);
     println!("commitment {}", seal::root(&seals));

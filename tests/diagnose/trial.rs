@@ -1,12 +1,12 @@
 //! A finding on trial, on concealed cases.
 
-use oare_ground::challenge::conceal::{Kind, Order, draw_order};
+use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::case::{Case, Header, Texts};
 use oare_ground::diagnose::{Analysis, Settings, analyse};
 
 fn files(kind: Kind, seed: u64, only: &'static str) -> Vec<(String, String)> {
-    draw_order(&Order { kind, seed, only: Some(only), other_physics: false }).files
+    draw_order(&Order { kind, seed, only: Some(only), manner: Manner::default() }).files
 }
 
 fn case(files: &[(String, String)]) -> Case {

@@ -75,8 +75,17 @@ pub struct Order {
     pub seed: u64,
     /// This effect or law instead of a drawn one.
     pub only: Option<&'static str>,
+    /// In what manner.
+    pub manner: Manner,
+}
+
+/// What a flight has that the analyser is not told of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Manner {
     /// Winds, density waves and panels of its own.
     pub other_physics: bool,
+    /// Bursts in the noise, which the SNR does not know of.
+    pub bursts: bool,
 }
 
 /// A case and its truth.
@@ -92,7 +101,7 @@ pub struct Concealed {
 
 /// Draws a case of a kind from a seed.
 pub fn draw(kind: Kind, seed: u64) -> Concealed {
-    draw_order(&Order { kind, seed, only: None, other_physics: false })
+    draw_order(&Order { kind, seed, only: None, manner: Manner::default() })
 }
 
 /// Flights tried until the drawn effect has a fair size on one.
@@ -136,13 +145,14 @@ struct Question {
 
 impl Question {
     fn draw(rng: &mut ChaCha12Rng, order: &Order, quieter: f64) -> Self {
-        let freedom = Freedom { single_attitude: order.kind == Kind::Single, other_physics: order.other_physics };
+        let freedom =
+            Freedom { single_attitude: order.kind == Kind::Single, other_physics: order.manner.other_physics };
         let mut flight = Flight::draw(rng, freedom);
         let ids = ids(rng, order);
         for id in &ids {
             require(rng, &mut flight, id);
         }
-        let mut noise = Noise::draw(rng, order.kind == Kind::Slow);
+        let mut noise = Noise::draw(rng, order.kind == Kind::Slow, order.manner.bursts);
         let floor = 55.0 / noise.awake_ng[0];
         let factor = (1.0 - quieter).max(floor).min(1.0);
         noise.awake_ng = noise.awake_ng.map(|level| level * factor);
@@ -220,7 +230,9 @@ impl Question {
     }
 
     fn written(self, rng: &mut ChaCha12Rng, order: &Order) -> Concealed {
-        let suffix = if order.other_physics { "-other" } else { "" };
+        let mut suffix = String::new();
+        suffix += if order.manner.other_physics { "-other" } else { "" };
+        suffix += if order.manner.bursts { "-bursts" } else { "" };
         let id = format!("{}-{:06}{suffix}", order.kind.word(), order.seed);
         let lacks_bulge = self.parts.iter().any(|(id, _, _)| id == "diurnal_bulge");
         let density_kg_m3 = record::simulated_density(&self.flight, lacks_bulge);

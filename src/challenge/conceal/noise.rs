@@ -24,11 +24,16 @@ pub struct Noise {
     pub slow_ng: [f64; 3],
     /// Its correlation time, s.
     pub slow_s: f64,
+    /// Whether one half window in a hundred is ten times as loud.
+    pub bursts: bool,
 }
+
+/// Share of half windows that are bursts, and how much louder they are.
+const BURSTS: [f64; 2] = [0.01, 10.0];
 
 impl Noise {
     /// Draws one; `slow` puts up to 30 ng of noise with 5 min to 3 h of memory beside the rest.
-    pub fn draw(rng: &mut ChaCha12Rng, slow: bool) -> Self {
+    pub fn draw(rng: &mut ChaCha12Rng, slow: bool, bursts: bool) -> Self {
         let x_ng = log_between(rng, 55.0, 330.0);
         let awake_ng = [x_ng, x_ng * between(rng, 0.45, 0.50), x_ng * between(rng, 0.56, 0.62)];
         let slow_ng = std::array::from_fn(|_| if slow { between(rng, 5.0, 30.0) } else { 0.0 });
@@ -39,6 +44,7 @@ impl Noise {
             red_s: log_between(rng, 100.0, 500.0),
             slow_ng,
             slow_s: log_between(rng, 300.0, 10_800.0),
+            bursts,
         }
     }
 
@@ -49,7 +55,8 @@ impl Noise {
         let (mut before, mut red_now, mut slow_now) = (normal(rng), normal(rng), normal(rng));
         let mut series = Vec::with_capacity(awake.len());
         for awake in awake {
-            let half = normal(rng);
+            let is_burst = self.bursts && between(rng, 0.0, 1.0) < BURSTS[0];
+            let half = normal(rng) * if is_burst { BURSTS[1] } else { 1.0 };
             red_now = red_keep * red_now + (1.0 - red_keep * red_keep).sqrt() * normal(rng);
             slow_now = slow_keep * slow_now + (1.0 - slow_keep * slow_keep).sqrt() * normal(rng);
             let quick = white * (half + before) / 2f64.sqrt() + red * red_now;
@@ -161,7 +168,7 @@ mod tests {
     #[test]
     fn whitened_noise_is_white_and_of_unit_variance() {
         let mut rng = ChaCha12Rng::seed_from_u64(1);
-        let noise = Noise::draw(&mut rng, true);
+        let noise = Noise::draw(&mut rng, true, false);
         let windows = 40_000;
         let awake: Vec<f64> = (0..windows).map(|k| f64::from(u8::from(k % 3456 > 1152))).collect();
         let kept: Vec<bool> = (0..windows).map(|k| k % 600 > 38).collect();

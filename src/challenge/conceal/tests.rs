@@ -52,7 +52,12 @@ fn differs_by_noise(case: &Concealed) {
 #[test]
 fn drawn_effects_have_a_fair_snr_and_are_not_confused_with_themselves() {
     for (seed, id) in effect::IDS.iter().enumerate().step_by(3) {
-        let order = Order { kind: Kind::One, seed: seed as u64, only: Some(id), other_physics: seed % 2 == 0 };
+        let order = Order {
+            kind: Kind::One,
+            seed: seed as u64,
+            only: Some(id),
+            manner: Manner { other_physics: seed % 2 == 0, bursts: false },
+        };
         let case = draw_order(&order);
         let snr = case.truth.snr[*id];
         assert!(snr > 3.0 && snr < 400.0, "{id}: {snr}");

@@ -2,7 +2,7 @@
 //!
 //! Every step of a filter needs the one before, so that one series after another waits for itself; several are taken side by side.
 
-use super::{AxisNoise, Schedule};
+use super::{AxisNoise, Loudness, Schedule};
 
 /// Gains of whitening filters side by side, one row a window.
 #[derive(Debug, Clone, Copy)]
@@ -38,9 +38,9 @@ impl<'a, const L: usize> Riccati<'a, L> {
         }
     }
 
-    /// The row of window `i` at activities `s`, and the variances of its innovations; windows in order.
+    /// The row of window `i` at activities `s` and bursts, and the variances of its innovations; windows in order.
     #[inline(always)]
-    fn row(&mut self, i: usize, s: [f64; L]) -> (Row<L>, [f64; L]) {
+    fn row(&mut self, i: usize, s: [f64; L], burst: [f64; L]) -> (Row<L>, [f64; L]) {
         let [own, previous] = self.schedule.overlap[i];
         let step = self.schedule.step_s[i];
         if step != self.step_before {
@@ -50,7 +50,7 @@ impl<'a, const L: usize> Riccati<'a, L> {
         let mut row = Row { h: [[0.0; L]; 2], per_sd: [0.0; L], gain: [[0.0; L]; 3], decay: self.decay };
         let mut variance = [0.0; L];
         for l in 0..L {
-            let [vw, v1, v2] = [self.variance[0][l], self.variance[1][l], self.variance[2][l]];
+            let [vw, v1, v2] = [self.variance[0][l] * burst[l], self.variance[1][l], self.variance[2][l]];
             let [f1, f2] = [self.decay[0][l], self.decay[1][l]];
             let (p00, p01, p02) = (self.p[0][l], self.p[1][l] * f1, self.p[2][l] * f2);
             let p11 = f1 * f1 * (self.p[3][l] - v1) + v1;
@@ -185,13 +185,13 @@ pub struct Whitener {
 }
 
 impl Whitener {
-    /// From the noise, the windows and the activity of each.
-    pub fn new(noise: &AxisNoise, schedule: &Schedule, activity: &[f64]) -> Self {
+    /// From the noise, the windows and how loud each is.
+    pub fn new(noise: &AxisNoise, schedule: &Schedule, loudness: &Loudness) -> Self {
         let mut riccati = Riccati::new(&[*noise], schedule);
         let mut log_det = LogSum::new();
         let rows = (0..schedule.len())
             .map(|i| {
-                let (row, variance) = riccati.row(i, [activity[i]]);
+                let (row, variance) = riccati.row(i, [loudness.activity[i]], [loudness.burst[i]]);
                 log_det.add(variance);
                 row
             })
@@ -203,6 +203,11 @@ impl Whitener {
     /// Log determinant of the covariance.
     pub fn log_det(&self) -> f64 {
         self.log_det
+    }
+
+    /// Share of the variance of the innovation of window `i` that its new samples have as long as they are ordinary.
+    pub fn new_share(&self, i: usize, noise: &AxisNoise, schedule: &Schedule, loudness: &Loudness) -> f64 {
+        (loudness.activity[i] * schedule.overlap[i][0] * noise.white_ng * self.rows[i].per_sd[0]).powi(2)
     }
 
     /// Whitened innovations of a series at the windows.
@@ -268,21 +273,22 @@ impl Whitener {
 }
 
 /// Whitened data and whitened constant in one pass: their products (dd, dc, cc), and the log determinant of the covariance; several
-/// noises side by side, each with data and activity of its own.
+/// noises side by side, each with data and loudness of its own.
 pub(super) fn products<const L: usize>(
     noise: &[AxisNoise; L],
     schedule: &Schedule,
-    activity: [&[f64]; L],
+    loudness: [&Loudness; L],
     data: [&[f64]; L],
 ) -> [([f64; 3], f64); L] {
     let n = schedule.len();
-    let (activity, data) = (activity.map(|a| &a[..n]), data.map(|d| &d[..n]));
+    let (activity, burst) = (loudness.map(|a| &a.activity[..n]), loudness.map(|a| &a.burst[..n]));
+    let data = data.map(|d| &d[..n]);
     let mut riccati = Riccati::new(noise, schedule);
     let mut log_det = LogSum::new();
     let mut memory = [Memory::new(); 2];
     let mut sums = [[0.0; L]; 3];
     for i in 0..n {
-        let (row, variance) = riccati.row(i, std::array::from_fn(|l| activity[l][i]));
+        let (row, variance) = riccati.row(i, activity.map(|a| a[i]), burst.map(|b| b[i]));
         log_det.add(variance);
         let d = memory[0].whiten(&row, std::array::from_fn(|l| data[l][i]));
         let c = memory[1].whiten(&row, [1.0; L]);
@@ -306,19 +312,20 @@ mod tests {
     const NOISE: AxisNoise =
         AxisNoise { white_ng: 100.0, short_ng: 30.0, short_tau_s: 120.0, slow_ng: 25.0, slow_tau_s: 3600.0 };
 
-    fn record(seed: u64) -> (Schedule, Vec<f64>, Vec<f64>) {
+    fn record(seed: u64) -> (Schedule, Loudness, Vec<f64>) {
         let clock: Vec<f64> = (0..2000).filter(|i| i % 190 > 3).map(|i| 25.0 * f64::from(i)).collect();
         let schedule = Schedule::new(&clock);
-        let activity: Vec<f64> = (0..schedule.len()).map(|i| if i > 700 { 0.6 } else { 1.2 }).collect();
+        let mut loudness = Loudness::even((0..schedule.len()).map(|i| if i > 700 { 0.6 } else { 1.2 }).collect());
+        loudness.burst[400] = 20.0;
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-        let x = simulate(&NOISE, &schedule, &activity, || StandardNormal.sample(&mut rng));
-        (schedule, activity, x)
+        let x = simulate(&NOISE, &schedule, &loudness, || StandardNormal.sample(&mut rng));
+        (schedule, loudness, x)
     }
 
     #[test]
     fn series_side_by_side_come_out_as_each_alone() {
-        let (schedule, activity, x) = record(1);
-        let whitener = Whitener::new(&NOISE, &schedule, &activity);
+        let (schedule, loudness, x) = record(1);
+        let whitener = Whitener::new(&NOISE, &schedule, &loudness);
         let n = schedule.len();
         // The whole record, a stretch of it, its end, and nothing at all.
         let spans = [[0, n], [300, 420], [n - 30, n], [n, n]];
@@ -337,13 +344,13 @@ mod tests {
 
     #[test]
     fn products_of_several_noises_are_those_of_each() {
-        let (schedule, activity, x) = record(2);
+        let (schedule, loudness, x) = record(2);
         let louder = AxisNoise { slow_ng: 60.0, slow_tau_s: 900.0, ..NOISE };
         let y: Vec<f64> = x.iter().map(|x| x + 40.0).collect();
-        let both = products(&[NOISE, louder], &schedule, [&activity; 2], [&x, &y]);
-        assert_eq!(both[0], products(&[NOISE], &schedule, [&activity], [&x])[0]);
-        assert_eq!(both[1], products(&[louder], &schedule, [&activity], [&y])[0]);
-        let whitener = Whitener::new(&NOISE, &schedule, &activity);
+        let both = products(&[NOISE, louder], &schedule, [&loudness; 2], [&x, &y]);
+        assert_eq!(both[0], products(&[NOISE], &schedule, [&loudness], [&x])[0]);
+        assert_eq!(both[1], products(&[louder], &schedule, [&loudness], [&y])[0]);
+        let whitener = Whitener::new(&NOISE, &schedule, &loudness);
         let w = whitener.whiten(&x);
         let energy: f64 = w.iter().map(|w| w * w).sum();
         assert!((both[0].0[0] / energy - 1.0).abs() < 1e-12 && (both[0].1 - whitener.log_det()).abs() < 1e-6);

@@ -1,17 +1,28 @@
 //! The slow part of the noise, marginalised: what a residual gains by slow noise, and what it costs to have chosen it.
 
 use super::filter::products;
-use super::{AxisNoise, Schedule};
+use super::{AxisNoise, Loudness, Schedule};
 
 /// Amplitudes, ng, and correlation times, s, of the slow part over which it is marginalised: each about the middle of its share of
 /// an axis of logarithms.
 const SLOW_AMPLITUDES_NG: [f64; 12] = [0.35, 0.7, 1.4, 2.8, 5.6, 8.0, 11.2, 16.0, 22.4, 32.0, 45.0, 64.0];
 const SLOW_TIMES_S: [f64; 6] = [300.0, 650.0, 1400.0, 3000.0, 6500.0, 14_000.0];
+/// The trial of hardly any slow noise: the smallest amplitude, of a time in the middle.
+const LEAST: usize = 4;
 /// Noises weighed side by side.
 const LANES: usize = 4;
 
-/// Log of the restricted likelihood of residuals, every slow part marginalised over its amplitude and correlation time (their
-/// logarithms are as likely everywhere in the range), above the same at the noise given.
+/// The slow part of the noise of all axes, marginalised.
+#[derive(Debug, Clone, Copy)]
+pub struct SlowPart {
+    /// Log likelihood above that at the noise given.
+    pub above_fit: f64,
+    /// Log likelihood above that of hardly any slow noise: how much it is needed.
+    pub above_none: f64,
+}
+
+/// The restricted likelihood of residuals, every slow part marginalised over its amplitude and correlation time: their logarithms are
+/// as likely everywhere in the range.
 ///
 /// A residual that needs slow noise of one amplitude has it at the price of having chosen it; one that needs none may have
 /// any that is small. Without that price slow noise takes what a slow effect made.
@@ -19,8 +30,8 @@ pub fn slow_part_marginalised(
     noise: &[AxisNoise; 3],
     residual_ng: &[Vec<f64>; 3],
     schedule: &Schedule,
-    activity: &[Vec<f64>; 3],
-) -> f64 {
+    loudness: &[Loudness; 3],
+) -> SlowPart {
     let mut trials: Vec<(usize, AxisNoise, f64)> = Vec::new();
     for (k, noise) in noise.iter().enumerate() {
         trials.push((k, *noise, f64::NAN));
@@ -36,23 +47,22 @@ pub fn slow_part_marginalised(
     let mut likelihoods: Vec<f64> = Vec::with_capacity(trials.len());
     for group in trials.chunks(LANES) {
         let lane: [&(usize, AxisNoise, f64); LANES] = std::array::from_fn(|l| &group[l.min(group.len() - 1)]);
-        let found = products(
-            &lane.map(|t| t.1),
-            schedule,
-            lane.map(|t| &activity[t.0][..]),
-            lane.map(|t| &residual_ng[t.0][..]),
-        );
+        let found =
+            products(&lane.map(|t| t.1), schedule, lane.map(|t| &loudness[t.0]), lane.map(|t| &residual_ng[t.0][..]));
         let likelihood = |([dd, dc, cc], log_det): ([f64; 3], f64)| -0.5 * (log_det + dd - dc * dc / cc + cc.ln());
         likelihoods.extend(found.into_iter().take(group.len()).map(likelihood));
     }
     let per_axis = trials.len() / 3;
     let axes = trials.chunks(per_axis).zip(likelihoods.chunks(per_axis));
-    let above = |(trials, likelihoods): (&[(usize, AxisNoise, f64)], &[f64])| {
+    let mut all = SlowPart { above_fit: 0.0, above_none: 0.0 };
+    for (trials, likelihoods) in axes {
         let at_fit = likelihoods[0];
         let weighed = trials[1..].iter().zip(&likelihoods[1..]).map(|(t, l)| t.2 / whole * (l - at_fit).exp());
-        weighed.sum::<f64>().max(1e-300).ln()
-    };
-    axes.map(above).sum()
+        let above_fit = weighed.sum::<f64>().max(1e-300).ln();
+        all.above_fit += above_fit;
+        all.above_none += above_fit + at_fit - likelihoods[LEAST];
+    }
+    all
 }
 
 #[cfg(test)]
@@ -67,15 +77,15 @@ mod tests {
     #[test]
     fn slow_noise_that_is_needed_costs_more_than_slow_noise_that_is_not() {
         let schedule = Schedule::new(&(0..3000).map(|i| 25.0 * f64::from(i)).collect::<Vec<f64>>());
-        let activity = std::array::from_fn(|_| vec![1.0; schedule.len()]);
+        let loudness = std::array::from_fn(|_| Loudness::even(vec![1.0; schedule.len()]));
         let noise =
             |slow_ng| AxisNoise { white_ng: 60.0, short_ng: 10.0, short_tau_s: 100.0, slow_ng, slow_tau_s: 3000.0 };
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let mut marginal = |made: f64, fitted: f64| {
             let residual = std::array::from_fn(|_| {
-                simulate(&noise(made), &schedule, &activity[0], || StandardNormal.sample(&mut rng))
+                simulate(&noise(made), &schedule, &loudness[0], || StandardNormal.sample(&mut rng))
             });
-            slow_part_marginalised(&[noise(fitted); 3], &residual, &schedule, &activity)
+            slow_part_marginalised(&[noise(fitted); 3], &residual, &schedule, &loudness).above_fit
         };
         let (none, loud) = (marginal(0.0, 1.0), marginal(30.0, 30.0));
         // A third of the amplitudes, each axis: at least ln 1/4 a piece; of thirty nanograms a few cells of seventy-two.

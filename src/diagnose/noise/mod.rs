@@ -9,11 +9,13 @@
 //! record too short to exclude slow noise is treated as having some. That is what keeps false leaks away.
 
 mod filter;
+mod loudness;
 mod marginal;
 
 pub use filter::Whitener;
 use filter::products;
-pub use marginal::slow_part_marginalised;
+pub use loudness::Loudness;
+pub use marginal::{SlowPart, slow_part_marginalised};
 
 use super::optimise::Simplex;
 
@@ -89,25 +91,6 @@ impl Schedule {
     }
 }
 
-/// Activity of every window, from the average deviation in sleep and wake; mean square 1.
-pub fn activity(dev_ng: &[f64], asleep: &[bool]) -> Vec<f64> {
-    let mean = |state: bool| {
-        let (sum, n) = dev_ng
-            .iter()
-            .zip(asleep)
-            .filter(|(_, a)| **a == state)
-            .fold((0.0, 0usize), |(s, n), (d, _)| (s + d, n + 1));
-        (n >= 30).then(|| sum / n as f64)
-    };
-    let level = match (mean(false), mean(true)) {
-        (Some(wake), Some(sleep)) if wake > 0.0 && sleep > 0.0 => [wake, sleep],
-        _ => [1.0, 1.0],
-    };
-    let raw: Vec<f64> = asleep.iter().map(|a| level[usize::from(*a)]).collect();
-    let rms = (raw.iter().map(|x| x * x).sum::<f64>() / raw.len().max(1) as f64).sqrt();
-    raw.iter().map(|x| x / rms).collect()
-}
-
 /// Amplitude at which the prior of the slow part turns down, ng.
 const SLOW_PRIOR_NG: f64 = 10.0;
 /// Longest and shortest correlation time of the slow part, s.
@@ -134,7 +117,7 @@ pub fn log_prior_but_slow(noise: &AxisNoise) -> f64 {
 pub fn fit<const L: usize>(
     residual_ng: [&[f64]; L],
     schedule: &Schedule,
-    activity: [&[f64]; L],
+    loudness: [&Loudness; L],
     start: Option<[&AxisNoise; L]>,
     evaluations: usize,
 ) -> [AxisNoise; L] {
@@ -153,7 +136,7 @@ pub fn fit<const L: usize>(
     // The overall scale is profiled: one rescaling step is exact up to the prior of the slow amplitude.
     let evaluate = |points: [&[f64]; L]| {
         let unit = std::array::from_fn(|l| noise_of(points[l], rms_ng[l]));
-        let found = products(&unit, schedule, activity, residual_ng);
+        let found = products(&unit, schedule, loudness, residual_ng);
         std::array::from_fn::<(AxisNoise, f64), L, _>(|l| {
             let ([dd, dc, cc], log_det) = found[l];
             let scale2 = (dd - dc * dc / cc) / (n - 1.0);
@@ -212,7 +195,12 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// A record of noise alone: `normal` gives independent standard normal numbers.
-pub fn simulate(noise: &AxisNoise, schedule: &Schedule, activity: &[f64], mut normal: impl FnMut() -> f64) -> Vec<f64> {
+pub fn simulate(
+    noise: &AxisNoise,
+    schedule: &Schedule,
+    loudness: &Loudness,
+    mut normal: impl FnMut() -> f64,
+) -> Vec<f64> {
     let mut previous = noise.white_ng * normal();
     let mut short = noise.short_ng * normal();
     let mut slow = noise.slow_ng * normal();
@@ -222,9 +210,9 @@ pub fn simulate(noise: &AxisNoise, schedule: &Schedule, activity: &[f64], mut no
             let [f1, f2] = [(-step / noise.short_tau_s).exp(), (-step / noise.slow_tau_s).exp()];
             short = f1 * short + (1.0 - f1 * f1).sqrt() * noise.short_ng * normal();
             slow = f2 * slow + (1.0 - f2 * f2).sqrt() * noise.slow_ng * normal();
-            let own = noise.white_ng * normal();
+            let own = noise.white_ng * loudness.burst[i].sqrt() * normal();
             let [a, b] = schedule.overlap[i];
-            let value = activity[i] * (a * own + b * previous + short) + slow;
+            let value = loudness.activity[i] * (a * own + b * previous + short) + slow;
             previous = own;
             value
         })
@@ -251,13 +239,14 @@ mod tests {
     }
 
     #[test]
-    fn what_the_filter_leaves_of_its_own_noise_is_white_and_of_unit_size_across_gaps_and_levels() {
+    fn what_the_filter_leaves_of_its_own_noise_is_white_and_of_unit_size_across_gaps_levels_and_bursts() {
         let noise =
             AxisNoise { white_ng: 100.0, short_ng: 30.0, short_tau_s: 120.0, slow_ng: 25.0, slow_tau_s: 3600.0 };
         let schedule = gappy();
-        let activity: Vec<f64> = (0..schedule.len()).map(|i| if i > 1500 { 0.6 } else { 1.2 }).collect();
-        let x = simulate(&noise, &schedule, &activity, normals(3));
-        let w = Whitener::new(&noise, &schedule, &activity).whiten(&x);
+        let mut loudness = Loudness::even((0..schedule.len()).map(|i| if i > 1500 { 0.6 } else { 1.2 }).collect());
+        loudness.burst.iter_mut().step_by(40).for_each(|burst| *burst = 30.0);
+        let x = simulate(&noise, &schedule, &loudness, normals(3));
+        let w = Whitener::new(&noise, &schedule, &loudness).whiten(&x);
         let n = w.len() as f64;
         let variance = dot(&w, &w) / n;
         // Five standard errors of a variance and of an autocorrelation.
@@ -273,9 +262,9 @@ mod tests {
         let noise =
             AxisNoise { white_ng: 100.0, short_ng: 25.0, short_tau_s: 110.0, slow_ng: 30.0, slow_tau_s: 3000.0 };
         let schedule = gappy();
-        let activity = vec![1.0; schedule.len()];
-        let x = simulate(&noise, &schedule, &activity, normals(11));
-        let [found] = fit([&x], &schedule, [&activity], None, 150);
+        let loudness = Loudness::even(vec![1.0; schedule.len()]);
+        let x = simulate(&noise, &schedule, &loudness, normals(11));
+        let [found] = fit([&x], &schedule, [&loudness], None, 150);
         assert!((found.white_ng / 100.0 - 1.0).abs() < 0.1, "{found:?}");
         assert!((found.slow_ng / 30.0).ln().abs() < 0.5, "{found:?}");
     }

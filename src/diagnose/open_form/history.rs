@@ -122,12 +122,15 @@ pub(super) fn events(c: &mut Collector) {
     }
 }
 
-/// A push some time after every entry of the log, that dies away.
+/// A push some time after every entry of the log, that dies away: delays closer than the time it lasts, so that none falls
+/// between. Of what is logged all the time, the delay is anyone's guess.
 fn echoes(c: &mut Collector, kind: &str, ends: &[(f64, f64)]) {
+    const OFTEN: usize = 60;
     let s = c.scene;
     let mut members = Vec::new();
-    for delay in [300.0, 600.0, 900.0, 1300.0, 1800.0, 2400.0, 3000.0, 3600.0, 4500.0, 6000.0] {
-        for tau in [400.0, 1000.0, 2500.0] {
+    for (tau, step) in [(400.0, 300.0), (1000.0, 500.0), (2500.0, 1000.0)] {
+        let step = if ends.len() > OFTEN { 2.0 * step } else { step };
+        for delay in (1..).map(|i| step * f64::from(i)).take_while(|delay| *delay < 6100.0) {
             let late: Vec<(f64, f64)> = ends.iter().map(|x| (x.0 + delay, 1.0)).collect();
             members.push((format!("exp(-(time since {delay:.0} s after {kind})/{tau:.0} s)"), since(s, &late, tau)));
         }

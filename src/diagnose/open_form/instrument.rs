@@ -42,6 +42,28 @@ pub(super) fn sensor(c: &mut Collector) {
     c.grid("|dT/dt|", "temperature", "changing temperature", |g| slope(g).abs());
     c.grid("(T - <T>)^2", "temperature", "extreme temperature", |g| (t[g] - mean).powi(2));
     c.grid("(T - <T>)^3", "temperature", "extreme temperature", |g| (t[g] - mean).powi(3));
+    // Hysteresis: what a follower with slack lags behind (the play operator of Prandtl 1928).
+    let behind = |series: &[f64], slack: f64| -> Vec<f64> {
+        let mut follower = series[0];
+        let follow = |x: &f64| {
+            follower = follower.clamp(x - slack / 2.0, x + slack / 2.0);
+            follower - x
+        };
+        series.iter().map(follow).collect()
+    };
+    let slacks = [0.15, 0.3, 0.5, 0.8, 1.2].map(|slack| {
+        let behind = behind(t, slack);
+        (format!("T behind itself by a slack of {slack:.2} C"), s.measure_scalar(|g| behind[g]))
+    });
+    c.family("temperature", "reversals of the temperature", slacks);
+    for i in 0..3 {
+        let rms = crate::math::rms::rms_about_mean(&m[i]);
+        let slacks = [0.5, 1.0, 2.0].map(|share| {
+            let slack = share * rms;
+            (format!("m{} behind itself by a slack of {slack:.0} ng", AXIS[i]), behind(&m[i], slack))
+        });
+        c.family("modelled_signal", "reversals of the modelled signal", slacks);
+    }
     c.vectors(
         "m (T - <T>)",
         "temperature",

@@ -14,6 +14,15 @@ pub struct Weighed {
     pub noise: [AxisNoise; 3],
     /// Log posterior, up to a constant common to all sets of a case.
     pub log_posterior: f64,
+    /// Log likelihood of slow noise in its residual above that of hardly any.
+    pub slow_evidence: f64,
+}
+
+impl Weighed {
+    /// The residual of the scene, behind the filters of this noise.
+    pub fn frame(&self, scene: &Scene) -> Frame {
+        Frame::new(&self.noise, &scene.schedule, &scene.loudness, &scene.residual_ng)
+    }
 }
 
 /// Residual of a set at the noise of a frame.
@@ -34,8 +43,8 @@ pub fn fit_noise(
     start: Option<&[AxisNoise; 3]>,
     evaluations: usize,
 ) -> [AxisNoise; 3] {
-    let (residual, activity) = (residual_ng.each_ref().map(|x| &x[..]), scene.activity.each_ref().map(|a| &a[..]));
-    noise::fit(residual, &scene.schedule, activity, start.map(|s| s.each_ref()), evaluations)
+    let residual = residual_ng.each_ref().map(|x| &x[..]);
+    noise::fit(residual, &scene.schedule, scene.loudness.each_ref(), start.map(|s| s.each_ref()), evaluations)
 }
 
 /// Weigh a set with its own noise: alternately noise and coefficients, `rounds` times.
@@ -49,18 +58,17 @@ pub fn weigh_with_own_noise(
 ) -> Weighed {
     let mut noise = *start;
     let mut set = set.clone();
-    let mut frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let mut frame = Frame::new(&noise, &scene.schedule, &scene.loudness, &scene.residual_ng);
     set.rewhiten(scene, &frame, entries);
     for _ in 0..rounds {
         noise = fit_noise(scene, &residual(scene, &frame, entries, &set), Some(&noise), evaluations);
-        frame = Frame::new(&noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+        frame = Frame::new(&noise, &scene.schedule, &scene.loudness, &scene.residual_ng);
         set.rewhiten(scene, &frame, entries);
     }
     refine(scene, &frame, entries, &mut set);
     let left = residual(scene, &frame, entries, &set);
-    let log_posterior = frame.log_null
-        + set.score
-        + noise.iter().map(noise::log_prior_but_slow).sum::<f64>()
-        + noise::slow_part_marginalised(&noise, &left, &scene.schedule, &scene.activity);
-    Weighed { set, noise, log_posterior }
+    let slow = noise::slow_part_marginalised(&noise, &left, &scene.schedule, &scene.loudness);
+    let log_posterior =
+        frame.log_null + set.score + noise.iter().map(noise::log_prior_but_slow).sum::<f64>() + slow.above_fit;
+    Weighed { set, noise, log_posterior, slow_evidence: slow.above_none }
 }

@@ -2,7 +2,6 @@
 
 use super::effect_of;
 use crate::diagnose::catalogue::WHOLE;
-use crate::diagnose::design::Frame;
 use crate::diagnose::scene::Scene;
 use crate::diagnose::search::{Set, Weighed};
 use crate::diagnose::solve::Library;
@@ -19,7 +18,7 @@ pub fn credible<'a>(
 ) -> Vec<&'a Weighed> {
     let mut kept = Vec::new();
     for w in sets {
-        let frame = Frame::new(&w.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+        let frame = w.frame(scene);
         let mut set = w.set.clone();
         set.rewhiten(scene, &frame, &library.entries);
         let (mean, covariance) = set.coefficients(&frame, &library.entries);

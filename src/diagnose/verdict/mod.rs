@@ -14,7 +14,7 @@ use self::fit::fit;
 use self::limits::upper_limits;
 use self::named::name;
 use self::stands::{fails, tried};
-use self::unnamed::{hypothesis, of_remains};
+use self::unnamed::{hypothesis, of_failure, of_remains};
 use super::answer::{Diagnosis, Located, Verdict};
 use super::catalogue::Effect;
 use super::design::Frame;
@@ -29,6 +29,8 @@ use super::solve::{Library, Solution};
 const OPEN_MARGIN: f64 = 3.0;
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
 const EVIDENCE_SHARE: f64 = 0.8;
+/// A finding that fails its trial is still a mismatch when noise makes its evidence this much more rarely than a claim asks.
+const BEYOND_DOUBT: f64 = 0.05;
 /// What remains overturns an explanation when it has more than this share of the energy explained.
 const REMAINS_SHARE: f64 = 0.03;
 
@@ -83,6 +85,12 @@ pub fn conclude(
             scene.case.windows_too_rough
         ));
     }
+    let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
+    if bursts > 0 {
+        notes.push(format!(
+            "{bursts} values out of the ordinary weigh less: more than 5 standard deviations of the noise"
+        ));
+    }
     let listed = credible(scene, library, &solution.listed, &mut notes);
     let top = |sets: &[&Weighed]| sets.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior);
     let open: Vec<&Weighed> = solution.open.iter().collect();
@@ -102,22 +110,24 @@ pub fn conclude(
         Verdict::Unexplained => solution.listed.first(),
         _ => Some(simplest(&listed)),
     };
-    let (verdict, chosen) = match chosen.and_then(|weighed| fails(&tried(scene, library, weighed))) {
-        Some(failure) => {
-            notes.push(failure);
-            (Verdict::Consistent, None)
-        }
-        None => (verdict, chosen),
+    let on_trial = chosen.map(|weighed| (weighed, tried(scene, library, weighed)));
+    let failure = on_trial.as_ref().and_then(|(_, tried)| fails(tried));
+    let (verdict, on_trial) = match &failure {
+        Some(_) if probability > BEYOND_DOUBT * claim => (Verdict::Consistent, None),
+        Some(_) => (Verdict::Unexplained, on_trial),
+        None => (verdict, on_trial),
     };
-    let (verdict, chosen, remains) = with_remains(scene, library, solution, (verdict, chosen), claim);
-    let tried = tried(scene, library, chosen.unwrap_or(&solution.null));
+    notes.extend(failure.clone());
+    let chosen = on_trial.as_ref().map(|(weighed, _)| *weighed);
+    let (verdict, remains) = with_remains(scene, library, solution, (verdict, chosen), claim);
+    let tried = on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
     let least = remains.as_ref().map_or(1.0, |r| r.probability);
     let overall = (probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
     let statistic = Some(solution.statistic());
     let mut answer = Diagnosis { verdict, statistic, ..Diagnosis::nothing(&scene.case.header.id, overall) };
     answer.located.covariates =
         locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
-    let null_frame = Frame::new(&solution.null.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let null_frame = solution.null.frame(scene);
     let Some(weighed) = chosen else {
         answer.notes = notes;
         if let Some(r) = remains.filter(|_| verdict == Verdict::Unexplained) {
@@ -129,7 +139,7 @@ pub fn conclude(
             Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), tried, &mut answer.notes).0);
         return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder);
     };
-    let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let frame = weighed.frame(scene);
     let mut set = weighed.set.clone();
     set.rewhiten(scene, &frame, &library.entries);
     let (fit, inflation) = fit(scene, library, &frame, weighed, &set, tried, &mut notes);
@@ -147,9 +157,12 @@ pub fn conclude(
     answer.upper_limits = upper_limits(scene, library, &best.frame, &best.set);
     match verdict {
         Verdict::Unexplained => {
-            answer.hypothesis = Some(match remains.filter(|_| !open_wins && !refused) {
-                Some(r) => of_remains(&r, &format!(" It remains beside {}.", ids(library, &best.set).join(" + "))),
-                None => hypothesis(library, &best, &listed, open_wins),
+            answer.hypothesis = Some(match (failure, remains.filter(|_| !open_wins && !refused)) {
+                (Some(failure), _) => of_failure(&ids(library, &best.set).join(" + "), &failure),
+                (None, Some(r)) => {
+                    of_remains(&r, &format!(" It remains beside {}.", ids(library, &best.set).join(" + ")))
+                }
+                (None, None) => hypothesis(library, &best, &listed, open_wins),
             });
         }
         _ => name(&mut answer, scene, library, &best, &listed),
@@ -159,19 +172,19 @@ pub fn conclude(
 }
 
 /// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.
-fn with_remains<'a>(
+fn with_remains(
     scene: &Scene,
     library: &Library,
-    solution: &'a Solution,
-    (verdict, chosen): (Verdict, Option<&'a Weighed>),
+    solution: &Solution,
+    (verdict, chosen): (Verdict, Option<&Weighed>),
     claim: f64,
-) -> (Verdict, Option<&'a Weighed>, Option<Remains>) {
+) -> (Verdict, Option<Remains>) {
     let weighed = chosen.unwrap_or(&solution.null);
-    let frame = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &scene.residual_ng);
+    let frame = weighed.frame(scene);
     let mut set = weighed.set.clone();
     set.rewhiten(scene, &frame, &library.entries);
     let left = search::residual(scene, &frame, &library.entries, &set);
-    let after = Frame::new(&weighed.noise, &scene.schedule, &scene.activity, &left);
+    let after = Frame::new(&weighed.noise, &scene.schedule, &scene.loudness, &left);
     let whitened: Axes = std::array::from_fn(|k| after.data.projected(k, &after));
     let remains = remains::strongest(scene.clock_s(), &whitened, weighed.noise.map(|n| n.rms_ng()));
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
@@ -179,9 +192,9 @@ fn with_remains<'a>(
         .as_ref()
         .is_some_and(|r| r.probability <= (1.0 - EVIDENCE_SHARE) * claim && r.energy > REMAINS_SHARE * explained);
     match verdict {
-        Verdict::Consistent | Verdict::Explained if overturns => (Verdict::Unexplained, chosen, remains),
-        Verdict::Explained => (verdict, chosen, None),
-        _ => (verdict, chosen, remains),
+        Verdict::Consistent | Verdict::Explained if overturns => (Verdict::Unexplained, remains),
+        Verdict::Explained => (verdict, None),
+        _ => (verdict, remains),
     }
 }
 

@@ -16,6 +16,16 @@ pub fn of_remains(r: &Remains, beside: &str) -> Hypothesis {
     }
 }
 
+/// From a set whose evidence is beyond doubt, and which failed its trial: something is there, and it is not this.
+pub fn of_failure(set: &str, failure: &str) -> Hypothesis {
+    Hypothesis {
+        formula: "none".into(),
+        axis: "x, y, z".into(),
+        unit: "ng".into(),
+        location: format!("Where {set} would act, which comes nearest. {failure}."),
+    }
+}
+
 /// From the open forms that won, or from nothing where none did, with the listed sets that came near.
 pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins: bool) -> Hypothesis {
     let near = |w: &&Weighed| {

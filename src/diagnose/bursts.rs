@@ -1,0 +1,103 @@
+//! Windows whose samples are out of the ordinary: where no hypothesis explains them they weigh less, as under Student's t of few
+//! degrees of freedom (Lange, Little and Taylor 1989).
+//!
+//! The tails alone are heavy: a record whose whitened residuals all lie within [`OUT`] is weighed as Gaussian noise is.
+
+use super::noise::{AxisNoise, Loudness, Schedule, Whitener, dot};
+use super::scene::Scene;
+use super::search;
+use super::solve::{Library, Solution, Stop, solve_unless};
+
+/// Whitened residual beyond which samples are out of the ordinary: of Gaussian noise one record in a hundred has one such window.
+const OUT: f64 = 5.0;
+/// Degrees of freedom of the tails.
+const DEGREES: f64 = 4.0;
+/// Searches, each beside the bursts of the one before.
+const ROUNDS: usize = 3;
+
+/// Searches and weighs as [`solve_unless`], then looks for bursts in what the best hypothesis leaves, and searches again beside them
+/// until there are no more.
+pub fn solve_beside_bursts(
+    scene: &mut Scene,
+    library: &Library,
+    start: Option<&[AxisNoise; 3]>,
+    stop: Stop,
+) -> Option<Solution> {
+    let mut solution = solve_unless(scene, library, start, stop)?;
+    for _ in 1..ROUNDS {
+        let best = solution.best();
+        let frame = best.frame(scene);
+        let mut set = best.set.clone();
+        set.rewhiten(scene, &frame, &library.entries);
+        let left = search::residual(scene, &frame, &library.entries, &set);
+        let mut found = false;
+        for (k, left) in left.iter().enumerate() {
+            found |= weigh_less(&mut scene.loudness[k], left, &best.noise[k], &scene.schedule);
+        }
+        if !found {
+            break;
+        }
+        let null_noise = solution.null.noise;
+        solution = solve_unless(scene, library, Some(&null_noise), stop)?;
+    }
+    Some(solution)
+}
+
+/// Gives windows their bursts where what is left of the data is out of the ordinary; whether there are any new ones.
+fn weigh_less(loudness: &mut Loudness, left: &[f64], noise: &AxisNoise, schedule: &Schedule) -> bool {
+    let whitener = Whitener::new(noise, schedule, loudness);
+    let mut whitened = whitener.whiten(left);
+    let one = whitener.whiten(&vec![1.0; left.len()]);
+    let constant = dot(&one, &whitened) / dot(&one, &one);
+    whitened.iter_mut().zip(&one).for_each(|(w, one)| *w -= constant * one);
+    let mut found = false;
+    for (i, z) in whitened.iter().enumerate().filter(|(_, z)| z.abs() > OUT) {
+        // The variance of the innovation that Student's t gives it, all of it in the samples that are new to the window.
+        let more = (DEGREES + z * z) / (DEGREES + 1.0) - 1.0;
+        loudness.burst[i] += more / whitener.new_share(i, noise, schedule, loudness);
+        found = true;
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::noise::simulate;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    const NOISE: AxisNoise =
+        AxisNoise { white_ng: 100.0, short_ng: 20.0, short_tau_s: 120.0, slow_ng: 2.0, slow_tau_s: 3000.0 };
+
+    fn record(bursts: &[usize]) -> (Schedule, Loudness, Vec<f64>) {
+        let schedule = Schedule::new(&(0..4000).map(|i| 25.0 * f64::from(i)).collect::<Vec<f64>>());
+        let even = Loudness::even(vec![1.0; schedule.len()]);
+        let mut loud = even.clone();
+        bursts.iter().for_each(|i| loud.burst[*i] = 400.0);
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+        let x = simulate(&NOISE, &schedule, &loud, || StandardNormal.sample(&mut rng));
+        (schedule, even, x)
+    }
+
+    /// A burst is in two windows that overlap, and is one: the window after it knows of it.
+    #[test]
+    fn a_burst_is_found_where_it_begins_and_the_window_after_it_is_not_another() {
+        let bursts = [500, 1700, 1701, 3100];
+        let (schedule, mut loudness, x) = record(&bursts);
+        assert!(weigh_less(&mut loudness, &x, &NOISE, &schedule));
+        while weigh_less(&mut loudness, &x, &NOISE, &schedule) {}
+        let found: Vec<usize> = (0..schedule.len()).filter(|i| loudness.burst[*i] > 1.0).collect();
+        assert!(!found.is_empty() && found.iter().all(|i| bursts.contains(i)), "{found:?}");
+        let whitened = Whitener::new(&NOISE, &schedule, &loudness).whiten(&x);
+        assert!(whitened.iter().all(|w| w.abs() < 5.0));
+    }
+
+    #[test]
+    fn gaussian_noise_has_none() {
+        let (schedule, mut loudness, x) = record(&[]);
+        let even = loudness.clone();
+        assert!(!weigh_less(&mut loudness, &x, &NOISE, &schedule));
+        assert_eq!(loudness, even);
+    }
+}
