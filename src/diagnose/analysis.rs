@@ -95,7 +95,7 @@ impl<'a> Prepared<'a> {
 
     /// False-alarm probability, from the bootstrap where there was one, else from the table of nulls, and verdict.
     pub fn conclude(&self, reached: Option<Reached>) -> Analysis {
-        let table = null_table::false_alarm_probability(self.solution.statistic());
+        let table = null_table::false_alarm_probability(self.solution.statistic(), self.solution.null.slow_evidence);
         let decisive = match reached {
             // Few replicates cannot show a small probability: then the table decides, and the bootstrap may only forbid.
             Some(r) if r.least <= self.settings.claim_probability || r.probability > 3.0 * r.least => r.probability,

@@ -16,6 +16,10 @@ pub struct Diagnosis {
     /// The statistic behind it: log posterior odds of the best hypothesis against none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub statistic: Option<f64>,
+    /// Log likelihood of slow noise above that of hardly any, when nothing is left out: what the statistic is compared with depends
+    /// on it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slow_evidence: Option<f64>,
     /// Where the mismatch is, named or not.
     pub located: Located,
     /// What the simulation lacks, in order of posterior. Empty unless `explained` or `ambiguous`.
@@ -49,6 +53,7 @@ impl Diagnosis {
             verdict: Verdict::Consistent,
             false_alarm_probability,
             statistic: None,
+            slow_evidence: None,
             located: Located { frame: "body".into(), ..Located::default() },
             effects: Vec::new(),
             alternatives: Vec::new(),

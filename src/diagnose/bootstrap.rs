@@ -13,7 +13,7 @@ use super::design::Frame;
 use super::noise::{self, AxisNoise};
 use super::scene::{Axes, Scene};
 use super::search::{self, Bank, Set};
-use super::solve::{Library, solve};
+use super::solve::{Library, Solution, solve};
 use crate::math::shared_work;
 
 /// Log posterior odds by which the whole search may exceed the first look, since it joins effects, fits the noise anew and
@@ -78,17 +78,17 @@ impl<'a> Bootstrap<'a> {
     /// Whether replicate `index` reaches what is asked about.
     fn reaches(&self, index: usize) -> bool {
         let residual = self.noise_alone(index);
-        self.first_look(&residual) + REACH >= self.asked && self.searched(residual) >= self.asked
+        self.first_look(&residual) + REACH >= self.asked && self.searched(residual).statistic() >= self.asked
     }
 
-    /// The first look at replicate `index`, and its statistic, searched in full.
-    pub fn look_and_statistic(&self, index: usize) -> (f64, f64) {
+    /// The first look at replicate `index`, and all that the search finds in it.
+    pub fn look_and_solution(&self, index: usize) -> (f64, Solution) {
         let residual = self.noise_alone(index);
         (self.first_look(&residual), self.searched(residual))
     }
 
-    fn searched(&self, residual: Axes) -> f64 {
-        solve(&self.scene.with_residual(residual), self.library, Some(&self.noise)).statistic()
+    fn searched(&self, residual: Axes) -> Solution {
+        solve(&self.scene.with_residual(residual), self.library, Some(&self.noise))
     }
 
     fn noise_alone(&self, index: usize) -> Axes {

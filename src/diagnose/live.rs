@@ -337,7 +337,7 @@ impl Milestones {
 
 /// Probability that a recording which lacks nothing reaches these log posterior odds at any look, ever.
 fn anytime_probability(log_odds: f64) -> f64 {
-    null_table::false_alarm_probability(log_odds).max((-log_odds).exp()).min(1.0)
+    null_table::false_alarm_probability(log_odds, f64::INFINITY).max((-log_odds).exp()).min(1.0)
 }
 
 #[cfg(test)]
@@ -376,7 +376,9 @@ mod tests {
     #[test]
     fn many_looks_need_more_than_one_look() {
         let claim = Policy::default().claim_probability;
-        let once = (-100..200).map(|t| 0.1 * f64::from(t)).find(|t| null_table::false_alarm_probability(*t) <= claim);
+        let once = (-100..200)
+            .map(|t| 0.1 * f64::from(t))
+            .find(|t| null_table::false_alarm_probability(*t, f64::INFINITY) <= claim);
         let ever = (-100..200).map(|t| 0.1 * f64::from(t)).find(|t| anytime_probability(*t) <= claim);
         assert!(ever > once, "{ever:?} {once:?}");
         // Odds of 500 to 1.

@@ -148,7 +148,7 @@ fn together(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
         // Two numbers a line of the spectrum, as far as the windows fill the grid.
         let degrees = 2.0 * (high - low + 1) as f64 * grid.windows / grid.length() as f64;
         let p = uncorrelated(degrees, r.determinant()) * bands.len() as f64;
-        let statistic = -(degrees - 1.0 - 11.0 / 6.0) * r.determinant().max(1e-300).ln();
+        let statistic = -(degrees - 11.0 / 6.0) * r.determinant().max(1e-300).ln();
         if best.as_ref().is_none_or(|b| p < b.0) {
             best = Some((p, [low, high], c, statistic));
         }
@@ -231,7 +231,7 @@ mod tests {
     #[test]
     fn a_correlation_matrix_near_unity_is_as_probable_as_counted() {
         for (n, x) in [(60.0, 0.9), (60.0, 0.7), (200.0, 0.9)] {
-            let bartlett = tail(3.0, -(n - 1.0 - 11.0 / 6.0) * f64::ln(x));
+            let bartlett = tail(3.0, -(n - 11.0 / 6.0) * f64::ln(x));
             let exact = uncorrelated(n, x);
             assert!((exact / bartlett - 1.0).abs() < 0.02, "{n} {x}: {exact} {bartlett}");
         }

@@ -43,9 +43,12 @@ pub struct Tried {
 pub struct Trial<'a> {
     scene: &'a Scene<'a>,
     frame: &'a Frame,
-    entries: &'a [Entry],
     set: &'a Set,
     noise: &'a [AxisNoise; 3],
+    /// The fitted series of the set.
+    signal: Axes,
+    /// Its columns over the whole record, and the prior size of those that are linear.
+    series: Vec<(Raw, Option<f64>)>,
 }
 
 /// A part of the record, as a case of its own.
@@ -75,7 +78,18 @@ impl<'a> Trial<'a> {
         set: &'a Set,
         noise: &'a [AxisNoise; 3],
     ) -> Self {
-        Self { scene, frame, entries, set, noise }
+        let left = search::residual(scene, frame, entries, set);
+        let signal = std::array::from_fn(|k| scene.residual_ng[k].iter().zip(&left[k]).map(|(a, b)| a - b).collect());
+        let mut series = Vec::new();
+        for m in &set.members {
+            let Some(raws) = entry_columns(scene, &entries[m.entry], &m.theta) else { continue };
+            for j in 0..m.linear().max(1) {
+                let place = m.axis.unwrap_or(j);
+                let size = (m.linear() > 0).then(|| m.scale * entries[m.entry].sizes[place]);
+                series.push((raws[place].clone(), size));
+            }
+        }
+        Self { scene, frame, set, noise, signal, series }
     }
 
     /// All of it.
@@ -89,7 +103,7 @@ impl<'a> Trial<'a> {
 
     /// Predicts each half of alternate blocks from the other.
     pub fn blocks(&self) -> HeldOut {
-        let whitened = self.frame.column(&self.signal().map(Some), 1.0);
+        let whitened = self.frame.column(&self.signal.clone().map(Some), 1.0);
         let mut energy = vec![0.0; self.scene.schedule.len()];
         for k in 0..3 {
             energy.iter_mut().zip(whitened.projected(k, self.frame)).for_each(|(sum, x)| *sum += x * x);
@@ -113,13 +127,12 @@ impl<'a> Trial<'a> {
 
     /// Log evidence of the set's own regressors above that of the best placebo; `None` where every shift imitates it.
     pub fn above_placebo(&self) -> Option<f64> {
-        let signal = self.signal();
-        let on_signal = self.frame.with_data(&signal);
+        let on_signal = self.frame.with_data(&self.signal);
         let energy = on_signal.data.dot(&on_signal.data);
         let own = self.set.chosen(self.frame).log_evidence;
         let n = self.scene.schedule.len();
         let placebo = |share: &f64| {
-            let (linear, fixed) = self.shifted((share * n as f64) as usize, n)?;
+            let (linear, fixed) = self.shifted((share * n as f64) as usize);
             let imitated = 2.0 * Chosen::new(&on_signal, Vec::new(), &[]).normal(&linear).explained();
             let fixed: Vec<&Column> = fixed.iter().collect();
             let evidence = Chosen::new(self.frame, linear.iter().collect(), &fixed).log_evidence;
@@ -129,28 +142,22 @@ impl<'a> Trial<'a> {
     }
 
     /// Whitened columns of the set, shifted in time by so many windows: linear ones and those of fixed amplitude.
-    fn shifted(&self, windows: usize, n: usize) -> Option<(Vec<Column>, Vec<Column>)> {
-        let turn = |series: &[f64]| -> Vec<f64> { (0..n).map(|i| series[(i + n - windows) % n]).collect() };
-        let (mut linear, mut fixed) = (Vec::new(), Vec::new());
-        for m in &self.set.members {
-            let raws = entry_columns(self.scene, &self.entries[m.entry], &m.theta)?;
-            for j in 0..m.linear().max(1) {
-                let place = m.axis.unwrap_or(j);
-                let turned: Raw = std::array::from_fn(|k| raws[place][k].as_deref().map(turn));
-                if m.linear() == 0 {
-                    fixed.push(self.frame.column(&turned, 1.0));
-                } else {
-                    linear.push(self.frame.column(&turned, m.scale * self.entries[m.entry].sizes[place]));
-                }
-            }
-        }
-        Some((linear, fixed))
+    fn shifted(&self, windows: usize) -> (Vec<Column>, Vec<Column>) {
+        let turn = |series: &[f64]| -> Vec<f64> {
+            let n = series.len();
+            (0..n).map(|i| series[(i + n - windows) % n]).collect()
+        };
+        self.columns(self.frame, &turn)
     }
 
-    /// The fitted series of the set.
-    fn signal(&self) -> Axes {
-        let left = search::residual(self.scene, self.frame, self.entries, self.set);
-        std::array::from_fn(|k| self.scene.residual_ng[k].iter().zip(&left[k]).map(|(all, left)| all - left).collect())
+    /// The columns of the set as `seen` of the whole record, whitened: linear ones and those of fixed amplitude.
+    fn columns(&self, frame: &Frame, seen: &dyn Fn(&[f64]) -> Vec<f64>) -> (Vec<Column>, Vec<Column>) {
+        let (mut linear, mut fixed) = (Vec::new(), Vec::new());
+        for (raw, size) in &self.series {
+            let column = frame.column(&raw.each_ref().map(|s| s.as_deref().map(seen)), size.unwrap_or(1.0));
+            if size.is_some() { linear.push(column) } else { fixed.push(column) }
+        }
+        (linear, fixed)
     }
 
     fn part(&self, index: Vec<usize>) -> Part {
@@ -165,7 +172,6 @@ impl<'a> Trial<'a> {
 
     fn predict_each(&self, division: &Division) -> HeldOut {
         let n = self.scene.schedule.len();
-        let fitted = self.signal();
         let mut after: Axes = self.scene.residual_ng.clone();
         let (mut signal_energy, mut missed_energy, mut gain) = (0.0, 0.0, 0.0);
         let mut block_gain = vec![0.0; division.block.iter().max().map_or(1, |last| last + 1)];
@@ -181,7 +187,7 @@ impl<'a> Trial<'a> {
             let predicted = self.predict(&on_train);
             let whiten =
                 |axes: &Axes| test.frame.column(&std::array::from_fn(|k| Some(pick(&axes[k], &test.index))), 1.0);
-            let (p, s) = (whiten(&predicted), whiten(&fitted));
+            let (p, s) = (whiten(&predicted), whiten(&self.signal));
             let missed = s.less(&p, 1.0);
             signal_energy += s.dot(&s);
             missed_energy += missed.dot(&missed);
@@ -209,34 +215,17 @@ impl<'a> Trial<'a> {
 
     /// The set on a part of the record.
     fn on(&self, part: &Part) -> OnPart {
-        let (mut series, mut linear, mut fixed) = (Vec::new(), Vec::new(), Vec::new());
-        for m in &self.set.members {
-            let Some(raws) = entry_columns(self.scene, &self.entries[m.entry], &m.theta) else { continue };
-            for j in 0..m.linear().max(1) {
-                let place = m.axis.unwrap_or(j);
-                let raw = raws[place].clone();
-                let picked: Raw = std::array::from_fn(|k| raw[k].as_deref().map(|s| pick(s, &part.index)));
-                if m.linear() == 0 {
-                    fixed.push(part.frame.column(&picked, 1.0));
-                    series.push((raw, None));
-                } else {
-                    let size = m.scale * self.entries[m.entry].sizes[place];
-                    linear.push(part.frame.column(&picked, size));
-                    series.push((raw, Some(size)));
-                }
-            }
-        }
+        let (linear, fixed) = self.columns(&part.frame, &|series| pick(series, &part.index));
         let beside = Chosen::new(&part.frame, Vec::new(), &fixed.iter().collect::<Vec<&Column>>());
-        OnPart { normal: beside.normal(&linear), of_fixed: beside.log_evidence, series }
+        OnPart { normal: beside.normal(&linear), of_fixed: beside.log_evidence }
     }
 
     /// The set's series over the whole record with amplitudes fitted to a part of it.
     fn predict(&self, train: &OnPart) -> Axes {
-        let n = self.scene.schedule.len();
-        let mut sum: Axes = std::array::from_fn(|_| vec![0.0; n]);
+        let mut sum: Axes = std::array::from_fn(|_| vec![0.0; self.scene.schedule.len()]);
         let mean = train.normal.posterior_mean();
         let mut mean = mean.iter();
-        for (raw, size) in &train.series {
+        for (raw, size) in &self.series {
             add(&mut sum, raw, size.map_or(1.0, |size| size * mean.next().unwrap_or(&0.0)));
         }
         sum
@@ -248,8 +237,6 @@ struct OnPart {
     normal: Normal,
     /// Log evidence of its members of fixed amplitude.
     of_fixed: f64,
-    /// Its columns over the whole record, and the prior size of those that are linear.
-    series: Vec<(Raw, Option<f64>)>,
 }
 
 fn add(sum: &mut Axes, raw: &Raw, factor: f64) {

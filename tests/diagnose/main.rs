@@ -1,5 +1,6 @@
 //! The diagnosis on the open cases, and its refusals. Shared data are read where they are; absent, the claim is skipped aloud.
 
+mod bursts;
 mod separating;
 mod trial;
 

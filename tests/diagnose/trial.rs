@@ -9,7 +9,7 @@ fn files(kind: Kind, seed: u64, only: &'static str) -> Vec<(String, String)> {
     draw_order(&Order { kind, seed, only: Some(only), manner: Manner::default() }).files
 }
 
-fn case(files: &[(String, String)]) -> Case {
+pub(crate) fn case(files: &[(String, String)]) -> Case {
     let text = |name: &str| files.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone());
     let texts = Texts {
         recording: text("recording.csv"),

@@ -17,6 +17,9 @@ pub struct Answer {
     /// The statistic behind it.
     #[serde(default)]
     pub statistic: Option<f64>,
+    /// Log likelihood of slow noise.
+    #[serde(default)]
+    pub slow_evidence: Option<f64>,
     /// Named effects, in order.
     #[serde(default)]
     pub effects: Vec<Named>,

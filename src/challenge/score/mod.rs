@@ -14,6 +14,7 @@ pub use answer::Answer;
 pub use rate::{Rate, wilson};
 
 use super::conceal::Truth;
+use crate::diagnose::null_table::is_quiet;
 
 /// One case, analysed.
 #[derive(Debug, Clone, Serialize)]
@@ -39,8 +40,9 @@ pub struct Score {
     pub mean_set_size: Option<f64>,
     /// Share of the held-out excess over the noise removed, SNR 20 and more: as reported (median), and by the true noise floor, pooled.
     pub excess_removed: Option<[f64; 2]>,
-    /// The statistic that shares of the cases without mismatch reach: (share, statistic), what a table of nulls is made of.
-    pub null_statistics: Vec<(f64, f64)>,
+    /// The statistic that shares of the cases without mismatch reach, (share, statistic): of quiet records, then of the others. What
+    /// the tables of nulls are made of.
+    pub null_statistics: [Vec<(f64, f64)>; 2],
     /// Time per case, s: median and 95th percentile.
     pub seconds: [f64; 2],
     /// Truth (id or kind) to first answer (id or verdict) to count.
@@ -59,7 +61,7 @@ pub fn score(outcomes: &[Outcome]) -> Score {
         rates: rates(&answered),
         mean_set_size: mean_set_size(&answered),
         excess_removed: excess_removed(&answered),
-        null_statistics: null_statistics(&answered),
+        null_statistics: [true, false].map(|quiet| null_statistics(&answered, quiet)),
         seconds: seconds(outcomes),
         confusion: confusion(&answered),
     }
@@ -158,9 +160,10 @@ fn excess_removed(all: &[Pair]) -> Option<[f64; 2]> {
 /// Shares of nulls whose statistic is given.
 const NULL_SHARES: [f64; 12] = [0.95, 0.75, 0.5, 0.25, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001];
 
-fn null_statistics(all: &[Pair]) -> Vec<(f64, f64)> {
+fn null_statistics(all: &[Pair], quiet: bool) -> Vec<(f64, f64)> {
     let nulls = all.iter().filter(|p| p.0.effects.is_empty());
-    let mut statistics: Vec<f64> = nulls.filter_map(|p| p.1.statistic).collect();
+    let asked = nulls.filter(|p| p.1.slow_evidence.is_some_and(|slow| is_quiet(slow) == quiet));
+    let mut statistics: Vec<f64> = asked.filter_map(|p| p.1.statistic).collect();
     statistics.sort_by(|a, b| b.total_cmp(a));
     // The statistic of so many of them, or more.
     let reached = |share: f64| (share * statistics.len() as f64).floor() as usize;

@@ -39,9 +39,12 @@ impl fmt::Display for Score {
             median,
             format!("({late:.2} s)")
         )?;
-        if !self.null_statistics.is_empty() {
-            let shares = self.null_statistics.iter().map(|(share, statistic)| format!("{share}: {statistic:.2}"));
-            writeln!(f, "statistic of nulls, share that reaches it: {}", shares.collect::<Vec<String>>().join(", "))?;
+        for (which, reached) in ["quiet", "slow"].into_iter().zip(&self.null_statistics) {
+            let shares: Vec<String> =
+                reached.iter().map(|(share, statistic)| format!("{share}: {statistic:.2}")).collect();
+            if !shares.is_empty() {
+                writeln!(f, "statistic of {which} nulls, share that reaches it: {}", shares.join(", "))?;
+            }
         }
         for (case, reason) in &self.failed {
             writeln!(f, "no answer to {case}: {reason}")?;

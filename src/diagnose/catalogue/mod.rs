@@ -104,7 +104,21 @@ pub struct Linear {
 }
 
 /// Fractions at which the whole of a term is missing, given what its own model may be off by.
-pub const WHOLE: [f64; 2] = [0.4, 1.6];
+const WHOLE: [f64; 2] = [0.4, 1.6];
+
+impl Linear {
+    /// Why a size cannot be believed, if it cannot; `doubt` is what it may be out by.
+    pub fn refuses(&self, value: f64, doubt: f64) -> Option<String> {
+        if value.abs() > self.size_max {
+            return Some(format!(
+                "it would need {} = {value:.3} {}, and {} is the most that can be believed",
+                self.name, self.unit, self.size_max
+            ));
+        }
+        (self.whole && (value + doubt < WHOLE[0] || value - doubt > WHOLE[1]))
+            .then(|| format!("the term is left out or it is not, and {value:.2} of it is neither"))
+    }
+}
 
 /// A nonlinear parameter.
 pub struct Nonlinear {

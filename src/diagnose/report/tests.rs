@@ -14,6 +14,7 @@ fn diagnosis(verdict: Verdict) -> Diagnosis {
         verdict,
         false_alarm_probability: if explained { 1e-4 } else { 0.4 },
         statistic: Some(40.0),
+        slow_evidence: Some(-1.0),
         located: Located { axes: vec!["x".into(), "z".into()], frame: "body".into(), ..Located::default() },
         effects: if explained {
             vec![EffectAnswer {

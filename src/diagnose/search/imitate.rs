@@ -1,7 +1,7 @@
 //! How nearly one effect imitates another on a record: what it leaves of the other's series, noise or no noise.
 
 use super::{Bank, Family};
-use crate::diagnose::catalogue::{Effect, Theta, WHOLE};
+use crate::diagnose::catalogue::{Effect, Theta};
 use crate::diagnose::design::{Chosen, Column};
 
 /// An imitation.
@@ -27,15 +27,9 @@ pub fn imitation(bank: &Bank, index: usize, chosen: &Chosen, whole: &Column) -> 
             let normal = chosen.normal(&point.columns);
             let (explained, sizes) = normal.free_fit()?;
             let values = sizes.iter().zip(&entry.sizes).map(|(x, size)| x * size);
-            believable(effect, values).then_some((energy - 2.0 * explained, point.theta))
+            let refused = effect.linear.iter().zip(values).any(|(l, value)| l.refuses(value, 0.0).is_some());
+            (!refused).then_some((energy - 2.0 * explained, point.theta))
         })
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(left, theta)| (effect, Imitation { left_snr: left.max(0.0).sqrt(), theta }))
-}
-
-fn believable(effect: &Effect, mut values: impl Iterator<Item = f64>) -> bool {
-    effect.linear.iter().all(|l| {
-        let value = values.next().unwrap_or(0.0);
-        value.abs() <= l.size_max && (!l.whole || (WHOLE[0]..=WHOLE[1]).contains(&value))
-    })
 }

@@ -1,7 +1,6 @@
 //! Which sets can be believed, and the simplest of those that are as good.
 
 use super::effect_of;
-use crate::diagnose::catalogue::WHOLE;
 use crate::diagnose::scene::Scene;
 use crate::diagnose::search::{Set, Weighed};
 use crate::diagnose::solve::Library;
@@ -27,22 +26,9 @@ pub fn credible<'a>(
         for (i, m) in set.members.iter().enumerate() {
             let Some(effect) = effect_of(&library.entries, &set, i) else { continue };
             for (k, l) in effect.linear.iter().enumerate().take(m.linear()) {
-                if mean[next + k].abs() > l.size_max {
-                    reason = Some(format!(
-                        "{} is refused: it would need {} = {:.3} {}, and {} is the most that can be believed",
-                        effect.id,
-                        l.name,
-                        mean[next + k],
-                        l.unit,
-                        l.size_max
-                    ));
-                }
-                let (fraction, doubt) = (mean[next + k], 2.0 * covariance[(next + k, next + k)].max(0.0).sqrt());
-                if l.whole && (fraction + doubt < WHOLE[0] || fraction - doubt > WHOLE[1]) {
-                    reason = Some(format!(
-                        "{} is refused: the term is left out or it is not, and {fraction:.2} of it is neither",
-                        effect.id
-                    ));
+                let doubt = 2.0 * covariance[(next + k, next + k)].max(0.0).sqrt();
+                if let Some(why) = l.refuses(mean[next + k], doubt) {
+                    reason = Some(format!("{} is refused: {why}", effect.id));
                 }
             }
             next += m.linear();

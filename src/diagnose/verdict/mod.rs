@@ -124,7 +124,9 @@ pub fn conclude(
     let least = remains.as_ref().map_or(1.0, |r| r.probability);
     let overall = (probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
     let statistic = Some(solution.statistic());
-    let mut answer = Diagnosis { verdict, statistic, ..Diagnosis::nothing(&scene.case.header.id, overall) };
+    let slow_evidence = Some(solution.null.slow_evidence);
+    let mut answer =
+        Diagnosis { verdict, statistic, slow_evidence, ..Diagnosis::nothing(&scene.case.header.id, overall) };
     answer.located.covariates =
         locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
     let null_frame = solution.null.frame(scene);

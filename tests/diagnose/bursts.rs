@@ -1,0 +1,34 @@
+//! Bursts in the noise, on concealed cases.
+
+use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
+use oare_ground::diagnose::answer::Verdict;
+use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
+
+const BURSTS: Manner = Manner { other_physics: false, bursts: true };
+
+fn answer(kind: Kind, only: Option<&'static str>, manner: Manner) -> Diagnosis {
+    let concealed = draw_order(&Order { kind, seed: 41, only, manner });
+    diagnose(&super::trial::case(&concealed.files), &Settings::default()).unwrap()
+}
+
+fn weigh_less(answer: &Diagnosis) -> bool {
+    answer.notes.iter().any(|note| note.contains("values out of the ordinary weigh less"))
+}
+
+/// One half window in a hundred ten times as loud: the errors of the effect grow by what those windows were worth, and not by what
+/// they are out by, which would be 1.4 times.
+#[test]
+fn bursts_are_no_finding_and_hide_none() {
+    let nothing = answer(Kind::Clean, None, BURSTS);
+    assert_eq!(nothing.verdict, Verdict::Consistent, "{nothing:?}");
+    assert!(weigh_less(&nothing), "{:?}", nothing.notes);
+    let [even, loud] = [Manner::default(), BURSTS].map(|manner| answer(Kind::One, Some("cg_offset"), manner));
+    assert!(!weigh_less(&even) && weigh_less(&loud));
+    for found in [&even, &loud] {
+        assert_eq!((found.verdict, found.effects[0].id.as_str()), (Verdict::Explained, "cg_offset"), "{found:?}");
+    }
+    for (a, b) in even.effects[0].parameters.iter().zip(&loud.effects[0].parameters) {
+        assert!(b.sigma < 1.2 * a.sigma, "{}: {} and {}", a.name, a.sigma, b.sigma);
+        assert!((a.value - b.value).abs() < 4.0 * a.sigma.hypot(b.sigma), "{}: {} and {}", a.name, a.value, b.value);
+    }
+}
