@@ -4,16 +4,18 @@
 mod credible;
 mod fit;
 mod imitators;
+mod judge;
 mod limits;
 mod named;
 mod stands;
 mod unnamed;
 
-use self::credible::{credible, simplest};
+use self::credible::credible;
 use self::fit::fit;
+use self::judge::{Judged, judge};
 use self::limits::upper_limits;
 use self::named::name;
-use self::stands::{fails, tried};
+use self::stands::tried;
 use self::unnamed::{hypothesis, of_failure, of_remains};
 use super::answer::{Diagnosis, Located, Verdict};
 use super::catalogue::Effect;
@@ -25,12 +27,8 @@ use super::scene::{Axes, Scene};
 use super::search::{self, Entry, Family, Set, Weighed};
 use super::solve::{Library, Solution};
 
-/// Log odds by which an open form must beat the best listed set.
-const OPEN_MARGIN: f64 = 3.0;
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
 const EVIDENCE_SHARE: f64 = 0.8;
-/// A finding that fails its trial is still a mismatch when noise makes its evidence this much more rarely than a claim asks.
-const BEYOND_DOUBT: f64 = 0.05;
 /// What remains overturns an explanation when it has more than this share of the energy explained.
 const REMAINS_SHARE: f64 = 0.03;
 
@@ -69,58 +67,14 @@ pub fn conclude(
     probability: f64,
     claim: f64,
 ) -> (Diagnosis, Axes, Vec<(String, f64)>) {
-    let null = solution.null.log_posterior;
-    let mut ladder: Vec<(String, f64)> = solution
-        .listed
-        .iter()
-        .chain(&solution.open)
-        .map(|w| (ids(library, &w.set).join(" + "), w.log_posterior - null))
-        .collect();
-    ladder.push(("nothing".into(), 0.0));
-    ladder.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut notes = Vec::new();
-    if scene.case.windows_too_rough > 0 {
-        notes.push(format!(
-            "{} windows are left out: the simulation changes too fast there for its own grid",
-            scene.case.windows_too_rough
-        ));
-    }
-    let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
-    if bursts > 0 {
-        notes.push(format!(
-            "{bursts} values out of the ordinary weigh less: more than 5 standard deviations of the noise"
-        ));
-    }
+    let mut notes = of_windows(scene);
     let listed = credible(scene, library, &solution.listed, &mut notes);
-    let top = |sets: &[&Weighed]| sets.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior);
-    let open: Vec<&Weighed> = solution.open.iter().collect();
-    let refused = solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior) - top(&listed) > OPEN_MARGIN;
-    let open_wins = top(&open) - top(&listed).max(null) > OPEN_MARGIN;
-    let claimed = probability <= EVIDENCE_SHARE * claim
-        && top(&listed).max(top(&open)).max(solution.listed.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior))
-            > null;
-    let verdict = match (claimed, open_wins || refused) {
-        (false, _) => Verdict::Consistent,
-        (true, true) => Verdict::Unexplained,
-        (true, false) => Verdict::Explained,
-    };
-    let chosen: Option<&Weighed> = match verdict {
-        Verdict::Consistent => None,
-        Verdict::Unexplained if open_wins => open.first().copied(),
-        Verdict::Unexplained => solution.listed.first(),
-        _ => Some(simplest(&listed)),
-    };
-    let on_trial = chosen.map(|weighed| (weighed, tried(scene, library, weighed)));
-    let failure = on_trial.as_ref().and_then(|(_, tried)| fails(tried));
-    let (verdict, on_trial) = match &failure {
-        Some(_) if probability > BEYOND_DOUBT * claim => (Verdict::Consistent, None),
-        Some(_) => (Verdict::Unexplained, on_trial),
-        None => (verdict, on_trial),
-    };
+    let judged = judge(scene, library, solution, &listed, probability, claim);
+    let Judged { open_wins, refused, failure, .. } = judged;
     notes.extend(failure.clone());
-    let chosen = on_trial.as_ref().map(|(weighed, _)| *weighed);
-    let (verdict, remains) = with_remains(scene, library, solution, (verdict, chosen), claim);
-    let tried = on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
+    let chosen = judged.on_trial.as_ref().map(|(weighed, _)| *weighed);
+    let (verdict, remains) = with_remains(scene, library, solution, (judged.verdict, chosen), claim);
+    let tried = judged.on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
     let least = remains.as_ref().map_or(1.0, |r| r.probability);
     let overall = (probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
     let statistic = Some(solution.statistic());
@@ -139,7 +93,7 @@ pub fn conclude(
         answer.upper_limits = upper_limits(scene, library, &null_frame, &Set::default());
         answer.fit =
             Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), tried, &mut answer.notes).0);
-        return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder);
+        return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder(library, solution));
     };
     let frame = weighed.frame(scene);
     let mut set = weighed.set.clone();
@@ -170,7 +124,30 @@ pub fn conclude(
         _ => name(&mut answer, scene, library, &best, &listed),
     }
     answer.notes = notes;
-    (answer, signal, ladder)
+    (answer, signal, ladder(library, solution))
+}
+
+/// Log posterior odds of every hypothesis against nothing, best first.
+fn ladder(library: &Library, solution: &Solution) -> Vec<(String, f64)> {
+    let rung = |w: &Weighed| (ids(library, &w.set).join(" + "), w.log_posterior - solution.null.log_posterior);
+    let mut ladder: Vec<(String, f64)> = solution.listed.iter().chain(&solution.open).map(rung).collect();
+    ladder.push(("nothing".into(), 0.0));
+    ladder.sort_by(|a, b| b.1.total_cmp(&a.1));
+    ladder
+}
+
+/// What must be known of the windows.
+fn of_windows(scene: &Scene) -> Vec<String> {
+    let rough = scene.case.windows_too_rough;
+    let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
+    let note = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
+    [
+        note(rough, "windows are left out: the simulation changes too fast there for its own grid"),
+        note(bursts, "values out of the ordinary weigh less: more than 5 standard deviations of the noise"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.

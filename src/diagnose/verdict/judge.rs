@@ -1,0 +1,61 @@
+//! What the evidence and the trial say, before what remains is asked.
+
+use super::EVIDENCE_SHARE;
+use super::credible::simplest;
+use super::stands::{fails, tried};
+use crate::diagnose::answer::Verdict;
+use crate::diagnose::scene::Scene;
+use crate::diagnose::search::Weighed;
+use crate::diagnose::solve::{Library, Solution};
+use crate::diagnose::trial::Tried;
+
+/// Log odds by which an open form must beat the best listed set.
+const OPEN_MARGIN: f64 = 3.0;
+/// A finding that fails its trial is still a mismatch when noise makes its evidence this much more rarely than a claim asks.
+const BEYOND_DOUBT: f64 = 0.05;
+
+/// The judgement of a case.
+pub struct Judged<'a> {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The set behind the verdict, and how its trial went.
+    pub on_trial: Option<(&'a Weighed, Tried)>,
+    /// Why it failed.
+    pub failure: Option<String>,
+    /// An open form is better than every set of listed effects.
+    pub open_wins: bool,
+    /// The best set of listed effects cannot be believed.
+    pub refused: bool,
+}
+
+/// Judges; `listed` are the sets of listed effects that can be believed, best first.
+pub fn judge<'a>(
+    scene: &Scene,
+    library: &Library,
+    solution: &'a Solution,
+    listed: &[&'a Weighed],
+    probability: f64,
+    claim: f64,
+) -> Judged<'a> {
+    let height = |w: Option<&Weighed>| w.map_or(f64::NEG_INFINITY, |w| w.log_posterior);
+    let null = solution.null.log_posterior;
+    let [top, best, open] =
+        [listed.first().copied(), solution.listed.first(), solution.open.first()].map(|w| (height(w), w));
+    let refused = best.0 - top.0 > OPEN_MARGIN;
+    let open_wins = open.0 - top.0.max(null) > OPEN_MARGIN;
+    let claimed = probability <= EVIDENCE_SHARE * claim && best.0.max(open.0) > null;
+    let (verdict, chosen) = match (claimed, open_wins, refused) {
+        (false, _, _) => (Verdict::Consistent, None),
+        (true, true, _) => (Verdict::Unexplained, open.1),
+        (true, false, true) => (Verdict::Unexplained, best.1),
+        (true, false, false) => (Verdict::Explained, Some(simplest(listed))),
+    };
+    let on_trial = chosen.map(|weighed| (weighed, tried(scene, library, weighed)));
+    let failure = on_trial.as_ref().and_then(|(_, tried)| fails(tried));
+    let (verdict, on_trial) = match &failure {
+        Some(_) if probability > BEYOND_DOUBT * claim => (Verdict::Consistent, None),
+        Some(_) => (Verdict::Unexplained, on_trial),
+        None => (verdict, on_trial),
+    };
+    Judged { verdict, on_trial, failure, open_wins, refused }
+}
