@@ -299,6 +299,20 @@ impl Normal {
         Cholesky::new(&self.a + DMatrix::identity(n, n)).map_or_else(|| DVector::zeros(n), |c| c.solve(&self.y))
     }
 
+    /// Whitened energy that a prediction from this part of a record is expected to miss of the series fitted to all of it, in the
+    /// part `unseen`: the posterior means of nested data differ by the fall of the posterior covariance.
+    pub fn expected_miss(&self, unseen: &Normal) -> f64 {
+        let n = self.y.len();
+        if n == 0 {
+            return 0.0;
+        }
+        let covariance = |a: &DMatrix<f64>| Cholesky::new(a + DMatrix::identity(n, n)).map(|c| c.inverse());
+        match (covariance(&self.a), covariance(&(&self.a + &unseen.a))) {
+            (Some(seen), Some(all)) => (&unseen.a * (seen - all)).trace(),
+            _ => f64::INFINITY,
+        }
+    }
+
     /// Log evidence gained by column `i` alone.
     pub fn gain_of(&self, i: usize, scale: f64) -> f64 {
         let one_more = scale * scale * self.a[(i, i)] + 1.0;

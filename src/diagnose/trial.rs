@@ -19,6 +19,8 @@ use crate::physics::Mat3;
 const BLOCKS_S: [f64; 4] = [21_600.0, 10_800.0, 5400.0, 2700.0];
 /// That share, of the whitened energy.
 const SHARE: f64 = 0.2;
+/// Share of the energy of a part that its prediction may be expected to miss, for the part to be predictable.
+const PREDICTABLE: f64 = 0.5;
 /// Fewest windows that can be left out, or fitted to.
 const WINDOWS_MIN: usize = 50;
 /// Shortest hold that counts as an attitude, s, and the angle within which it is one, rad: a deadband is narrower.
@@ -33,6 +35,9 @@ const PLACEBO_SHARE: f64 = 0.5;
 pub struct Tried {
     /// Each half of alternate blocks, predicted from the other.
     pub blocks: HeldOut,
+    /// Share of the effect predicted in those halves of which the other can say more than half; none where they have too little of it:
+    /// of a step between two blocks, each has nothing but a constant.
+    pub confirmed: Option<f64>,
     /// Each attitude, predicted from all others; none where there is but one.
     pub attitudes: Option<HeldOut>,
     /// Log evidence above that of the best placebo; none where every shift imitates the set.
@@ -96,13 +101,13 @@ impl<'a> Trial<'a> {
     pub fn tried(&self) -> Tried {
         let placebo = || if self.set.members.is_empty() { None } else { self.above_placebo() };
         let attitudes = || if self.set.members.is_empty() { None } else { self.attitudes() };
-        let (blocks, (attitudes, above_placebo)) =
+        let ((blocks, confirmed), (attitudes, above_placebo)) =
             shared_work::both(|| self.blocks(), || shared_work::both(attitudes, placebo));
-        Tried { blocks, attitudes, above_placebo }
+        Tried { blocks, confirmed, attitudes, above_placebo }
     }
 
-    /// Predicts each half of alternate blocks from the other.
-    pub fn blocks(&self) -> HeldOut {
+    /// Predicts each half of alternate blocks from the other; and the share predicted where it could be.
+    fn blocks(&self) -> (HeldOut, Option<f64>) {
         let whitened = self.frame.column(&self.signal.clone().map(Some), 1.0);
         let mut energy = vec![0.0; self.scene.schedule.len()];
         for k in 0..3 {
@@ -121,12 +126,12 @@ impl<'a> Trial<'a> {
     }
 
     /// Predicts each attitude from all others; `None` where there is but one.
-    pub fn attitudes(&self) -> Option<HeldOut> {
-        Division::attitudes(self.scene).map(|division| self.predict_each(&division))
+    fn attitudes(&self) -> Option<HeldOut> {
+        Division::attitudes(self.scene).map(|division| self.predict_each(&division).0)
     }
 
     /// Log evidence of the set's own regressors above that of the best placebo; `None` where every shift imitates it.
-    pub fn above_placebo(&self) -> Option<f64> {
+    fn above_placebo(&self) -> Option<f64> {
         let on_signal = self.frame.with_data(&self.signal);
         let energy = on_signal.data.dot(&on_signal.data);
         let own = self.set.chosen(self.frame).log_evidence;
@@ -170,10 +175,12 @@ impl<'a> Trial<'a> {
         Part { frame, index }
     }
 
-    fn predict_each(&self, division: &Division) -> HeldOut {
+    fn predict_each(&self, division: &Division) -> (HeldOut, Option<f64>) {
         let n = self.scene.schedule.len();
         let mut after: Axes = self.scene.residual_ng.clone();
         let (mut signal_energy, mut missed_energy, mut gain) = (0.0, 0.0, 0.0);
+        // The same of parts that the others can predict.
+        let (mut predictable, mut unpredicted) = (0.0, 0.0);
         let mut block_gain = vec![0.0; division.block.iter().max().map_or(1, |last| last + 1)];
         let parts: Range<usize> = 0..division.part.iter().flatten().max().map_or(0, |last| last + 1);
         for left_out in parts {
@@ -189,8 +196,13 @@ impl<'a> Trial<'a> {
                 |axes: &Axes| test.frame.column(&std::array::from_fn(|k| Some(pick(&axes[k], &test.index))), 1.0);
             let (p, s) = (whiten(&predicted), whiten(&self.signal));
             let missed = s.less(&p, 1.0);
-            signal_energy += s.dot(&s);
-            missed_energy += missed.dot(&missed);
+            let (signal, missed) = (s.dot(&s), missed.dot(&missed));
+            signal_energy += signal;
+            missed_energy += missed;
+            if on_train.normal.expected_miss(&on_test.normal) < PREDICTABLE * signal {
+                predictable += signal;
+                unpredicted += missed;
+            }
             let left = test.frame.data.less(&p, 1.0);
             for k in 0..3 {
                 let (b, a) = (test.frame.data.projected(k, &test.frame), left.projected(k, &test.frame));
@@ -203,14 +215,16 @@ impl<'a> Trial<'a> {
         let count = block_gain.len() as f64;
         let mean = block_gain.iter().sum::<f64>() / count;
         let spread = block_gain.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-        HeldOut {
+        let held = HeldOut {
             scheme: division.scheme.clone(),
             before_rms_ng: std::array::from_fn(|k| rms_about_mean(&self.scene.residual_ng[k])),
             after_rms_ng: std::array::from_fn(|k| rms_about_mean(&after[k])),
             excess_removed: if signal_energy > 0.0 { 1.0 - missed_energy / signal_energy } else { 0.0 },
             log_score_gain: gain,
             log_score_gain_se: (spread * count).sqrt(),
-        }
+        };
+        let whole = self.frame.with_data(&self.signal).data;
+        (held, (predictable >= SHARE * whole.dot(&whole)).then(|| 1.0 - unpredicted / predictable))
     }
 
     /// The set on a part of the record.

@@ -3,7 +3,7 @@
 //!
 //! Two figures of the blocks left out, since neither is enough. The log score shows a contradiction; but where the part fitted says
 //! nothing of an amplitude, the prior leaves room for whatever the part left out shows, and that scores. The share of the effect
-//! that is predicted there shows a confirmation. An attitude left out can confirm nothing of an effect that happens in another.
+//! that is predicted there, if the part fitted can say anything of it, shows a confirmation. An attitude left out can confirm nothing of an effect that happens in another.
 
 use crate::diagnose::answer::HeldOut;
 use crate::diagnose::scene::Scene;
@@ -36,10 +36,9 @@ pub fn fails(tried: &Tried) -> Option<String> {
             tried.blocks.log_score_gain
         ));
     }
-    if tried.blocks.excess_removed < CONFIRMS {
+    if let Some(share) = tried.confirmed.filter(|share| *share < CONFIRMS) {
         return Some(format!(
-            "a finding is refused: of the effect in blocks it has not seen it predicts a share of {:.2}",
-            tried.blocks.excess_removed
+            "a finding is refused: of the effect in blocks it has not seen it predicts a share of {share:.2}"
         ));
     }
     if let Some(held) = tried.attitudes.as_ref().filter(|held| misleads(held)) {
@@ -71,6 +70,7 @@ mod tests {
     fn a_finding_that_misleads_or_that_a_placebo_matches_is_refused_with_the_figure() {
         let tried = |blocks, attitudes: Option<f64>, above_placebo| Tried {
             blocks: held(blocks),
+            confirmed: Some(0.9),
             attitudes: attitudes.map(held),
             above_placebo,
         };
@@ -86,7 +86,7 @@ mod tests {
             assert!(fails(&tried).is_some_and(|why| why.contains("refused") && why.contains(figure)));
         }
         let mut unconfirmed = tried(41.7, Some(12.0), Some(30.0));
-        unconfirmed.blocks.excess_removed = 0.04;
+        unconfirmed.confirmed = Some(0.04);
         assert!(fails(&unconfirmed).is_some_and(|why| why.contains("a share of 0.04")));
     }
 }
