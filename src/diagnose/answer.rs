@@ -220,6 +220,10 @@ pub struct Fit {
     pub after: FitLevel,
     /// On data the fit has not seen.
     pub held_out: HeldOut,
+    /// Share of the effects predicted in those blocks held out of which the others can say more than half; none where these have too
+    /// little of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirmed: Option<f64>,
     /// Each attitude predicted from all others, where there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out_attitudes: Option<HeldOut>,

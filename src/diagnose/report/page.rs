@@ -155,6 +155,13 @@ fn held_out(page: &mut String, d: &Diagnosis) {
         short(fit.held_out.log_score_gain),
         short(fit.held_out.log_score_gain_se)
     );
+    if let Some(share) = fit.confirmed {
+        let _ = writeln!(
+            page,
+            "<p>Of what the other blocks can say of the effect, they predict {:.1} %.</p>",
+            100.0 * share
+        );
+    }
     if let Some(held) = &fit.left_out_attitudes {
         let _ = writeln!(
             page,

@@ -48,6 +48,7 @@ fn diagnosis(verdict: Verdict) -> Diagnosis {
             },
             left_out_attitudes: None,
             above_placebo: Some(12.0),
+            confirmed: Some(0.98),
         }),
         upper_limits: vec![UpperLimit { id: "solar_radiation_pressure".into(), limit_ng: 3.1 }],
         separating_observation: None,

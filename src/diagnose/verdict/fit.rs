@@ -47,6 +47,7 @@ pub fn fit(
         before: level(&scene.residual_ng, frame, 0.0),
         after: level(&left, &after, used),
         held_out: tried.blocks,
+        confirmed: tried.confirmed,
         left_out_attitudes: tried.attitudes,
         above_placebo: tried.above_placebo,
     };
