@@ -260,6 +260,9 @@ pub struct Normal {
     y: DVector<f64>,
 }
 
+/// Inverse square of how much wider a prior is taken.
+const WIDE: f64 = 0.03;
+
 impl Normal {
     /// Log evidence gained by these columns, their prior sizes all multiplied by `scale`.
     pub fn gain(&self, scale: f64) -> f64 {
@@ -300,13 +303,14 @@ impl Normal {
     }
 
     /// Whitened energy that a prediction from this part of a record is expected to miss of the series fitted to all of it, in the
-    /// part `unseen`: the posterior means of nested data differ by the fall of the posterior covariance.
+    /// part `unseen`: the posterior means of nested data differ by the fall of the posterior covariance. The priors are taken far
+    /// wider than they are, so that an effect several times its usual size is not thought to be known before it is seen.
     pub fn expected_miss(&self, unseen: &Normal) -> f64 {
         let n = self.y.len();
         if n == 0 {
             return 0.0;
         }
-        let covariance = |a: &DMatrix<f64>| Cholesky::new(a + DMatrix::identity(n, n)).map(|c| c.inverse());
+        let covariance = |a: &DMatrix<f64>| Cholesky::new(a + DMatrix::identity(n, n) * WIDE).map(|c| c.inverse());
         match (covariance(&self.a), covariance(&(&self.a + &unseen.a))) {
             (Some(seen), Some(all)) => (&unseen.a * (seen - all)).trace(),
             _ => f64::INFINITY,

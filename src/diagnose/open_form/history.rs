@@ -36,6 +36,20 @@ pub(super) fn since(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f
     sum
 }
 
+/// Sum of decays after instants, each beside those before.
+fn added(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f64> {
+    let clock = scene.clock_s();
+    let mut sum = vec![0.0; clock.len()];
+    for (instant, amplitude) in instants {
+        let first = clock.partition_point(|t| t + HALF_WINDOW_S <= *instant);
+        let last = clock.partition_point(|t| t - HALF_WINDOW_S < instant + 8.0 * tau_s).max(first);
+        for (total, pulse) in sum[first..last].iter_mut().zip(decay(&clock[first..last], *instant, tau_s)) {
+            *total += amplitude * pulse;
+        }
+    }
+    sum
+}
+
 pub(super) fn terminator(c: &mut Collector) {
     let s = c.scene;
     let all = crossings(&s.grid_s, &s.sunlit, 0.5);
@@ -122,17 +136,18 @@ pub(super) fn events(c: &mut Collector) {
     }
 }
 
-/// A push some time after every entry of the log, that dies away: delays closer than the time it lasts, so that none falls
-/// between. Of what is logged all the time, the delay is anyone's guess.
+/// A push some time after every entry of the log, that dies away, each beside those before: delays closer than the time it lasts, so
+/// that none falls between. Of what is logged all the time the delay is anyone's guess, and the last push alone is looked at.
 fn echoes(c: &mut Collector, kind: &str, ends: &[(f64, f64)]) {
-    const OFTEN: usize = 60;
+    const OFTEN: usize = 200;
     let s = c.scene;
     let mut members = Vec::new();
     for (tau, step) in [(400.0, 300.0), (1000.0, 500.0), (2500.0, 1000.0)] {
         let step = if ends.len() > OFTEN { 2.0 * step } else { step };
         for delay in (1..).map(|i| step * f64::from(i)).take_while(|delay| *delay < 6100.0) {
             let late: Vec<(f64, f64)> = ends.iter().map(|x| (x.0 + delay, 1.0)).collect();
-            members.push((format!("exp(-(time since {delay:.0} s after {kind})/{tau:.0} s)"), since(s, &late, tau)));
+            let pushes = if ends.len() > OFTEN { since(s, &late, tau) } else { added(s, &late, tau) };
+            members.push((format!("exp(-(time since {delay:.0} s after {kind})/{tau:.0} s)"), pushes));
         }
     }
     c.family("time_since_event", "some time after logged events", members);

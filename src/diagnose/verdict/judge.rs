@@ -51,7 +51,7 @@ pub fn judge<'a>(
         (true, false, false) => (Verdict::Explained, Some(simplest(listed))),
     };
     let on_trial = chosen.map(|weighed| (weighed, tried(scene, library, weighed)));
-    let failure = on_trial.as_ref().and_then(|(_, tried)| fails(tried));
+    let failure = on_trial.as_ref().and_then(|(_, tried)| fails(tried, solution.statistic()));
     let (verdict, on_trial) = match &failure {
         Some(_) if probability > BEYOND_DOUBT * claim => (Verdict::Consistent, None),
         Some(_) => (Verdict::Unexplained, on_trial),
