@@ -1,7 +1,7 @@
 //! Windows whose samples are out of the ordinary: where no hypothesis explains them they weigh less, as under Student's t of few
 //! degrees of freedom (Lange, Little and Taylor 1989).
 //!
-//! The tails alone are heavy: a record whose whitened residuals all lie within [`OUT`] is weighed as Gaussian noise is.
+//! The tails alone are heavy: a record whose whitened residuals all lie within five is weighed as Gaussian noise is.
 
 use super::noise::{AxisNoise, Loudness, Schedule, Whitener, dot};
 use super::scene::Scene;

@@ -99,7 +99,7 @@ pub struct Linear {
     pub size: f64,
     /// A value beyond this is not credible, whatever the fit.
     pub size_max: f64,
-    /// The simulation lacks the whole term or nothing of it: only a value about one is credible ([`WHOLE`]).
+    /// The simulation lacks the whole term or nothing of it: only a value about one is credible.
     pub whole: bool,
 }
 

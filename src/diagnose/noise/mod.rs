@@ -3,7 +3,8 @@
 //! Per axis three parts: white noise of the samples, seen through windows that overlap by half (a moving average, exactly
 //! as the stride has it), a short autoregression (tens of seconds to minutes), both following the crew's activity, and
 //! a slow autoregression (minutes to hours) that does not. The order was chosen so: one autoregression alone either
-//! misses the slow part or takes the overlap for it. State space, so that gaps are simply longer steps.
+//! misses the slow part or takes the overlap for it. State space, so that gaps are simply longer steps. Samples out of the ordinary
+//! have a variance of their own (see [`Loudness`]).
 //!
 //! The amplitude of the slow part is estimated on a logarithmic scale with a prior: it never reaches zero, and a
 //! record too short to exclude slow noise is treated as having some. That is what keeps false leaks away.
