@@ -7,7 +7,6 @@ use super::bootstrap::{Bootstrap, Reached};
 use super::bursts::solve_beside_bursts;
 use super::case::Case;
 use super::error::CaseError;
-use super::noise::AxisNoise;
 use super::null_table;
 use super::report::{CovariatePlate, Plates};
 use super::scene::{Axes, Scene};
@@ -82,15 +81,15 @@ impl<'a> Prepared<'a> {
         Ok(Self { scene, library, solution, settings: settings.clone() })
     }
 
-    /// The bootstrap of this case.
+    /// The bootstrap of this case, under the noise of the best hypothesis: its residual holds no effect.
     pub fn bootstrap(&self) -> Bootstrap<'_> {
-        Bootstrap::new(&self.scene, &self.library, self.null_noise(), self.settings.seed, self.solution.statistic())
-    }
-
-    /// Noise under which the bootstrap is made: that of the best hypothesis, for its residual holds no effect, unless it is larger
-    /// than the null's own.
-    fn null_noise(&self) -> [AxisNoise; 3] {
-        self.solution.best().noise
+        Bootstrap::new(
+            &self.scene,
+            &self.library,
+            self.solution.best().noise,
+            self.settings.seed,
+            self.solution.statistic(),
+        )
     }
 
     /// False-alarm probability, from the bootstrap where there was one, else from the table of nulls, and verdict.

@@ -1,15 +1,14 @@
 //! Windows whose samples are out of the ordinary: where no hypothesis explains them they weigh less, as under Student's t of few
 //! degrees of freedom (Lange, Little and Taylor 1989).
 //!
-//! The tails alone are heavy: a record whose whitened residuals all lie within five is weighed as Gaussian noise is.
+//! The tails alone are heavy: a record whose whitened residuals all lie within [`OUT`] is weighed as Gaussian noise is.
 
-use super::noise::{AxisNoise, Loudness, Schedule, Whitener, dot};
+use super::noise::{AxisNoise, Loudness, Schedule, Whitener};
 use super::scene::Scene;
-use super::search;
 use super::solve::{Library, Solution, Stop, solve_unless};
 
 /// Whitened residual beyond which samples are out of the ordinary: of Gaussian noise one record in a hundred has one such window.
-const OUT: f64 = 5.0;
+pub const OUT: f64 = 5.0;
 /// Degrees of freedom of the tails.
 const DEGREES: f64 = 4.0;
 /// Searches, each beside the bursts of the one before.
@@ -26,38 +25,32 @@ pub fn solve_beside_bursts(
     let mut solution = solve_unless(scene, library, start, stop)?;
     for _ in 1..ROUNDS {
         let best = solution.best();
-        let frame = best.frame(scene);
-        let mut set = best.set.clone();
-        set.rewhiten(scene, &frame, &library.entries);
-        let left = search::residual(scene, &frame, &library.entries, &set);
+        let whitened = best.whitened_residual(scene, &library.entries);
         let mut found = false;
-        for (k, left) in left.iter().enumerate() {
-            found |= weigh_less(&mut scene.loudness[k], left, &best.noise[k], &scene.schedule);
+        for k in 0..3 {
+            found |= weigh_less(&mut scene.loudness[k], &whitened[k], &best.noise[k], &scene.schedule);
         }
         if !found {
             break;
         }
-        let null_noise = solution.null.noise;
-        solution = solve_unless(scene, library, Some(&null_noise), stop)?;
+        solution = solve_unless(scene, library, Some(&solution.null.noise), stop)?;
     }
     Some(solution)
 }
 
-/// Gives windows their bursts where what is left of the data is out of the ordinary; whether there are any new ones.
-fn weigh_less(loudness: &mut Loudness, left: &[f64], noise: &AxisNoise, schedule: &Schedule) -> bool {
+/// Gives windows their bursts where the whitened residual is out of the ordinary; whether there are any new ones.
+fn weigh_less(loudness: &mut Loudness, whitened: &[f64], noise: &AxisNoise, schedule: &Schedule) -> bool {
+    let out: Vec<(usize, &f64)> = whitened.iter().enumerate().filter(|(_, z)| z.abs() > OUT).collect();
+    if out.is_empty() {
+        return false;
+    }
     let whitener = Whitener::new(noise, schedule, loudness);
-    let mut whitened = whitener.whiten(left);
-    let one = whitener.whiten(&vec![1.0; left.len()]);
-    let constant = dot(&one, &whitened) / dot(&one, &one);
-    whitened.iter_mut().zip(&one).for_each(|(w, one)| *w -= constant * one);
-    let mut found = false;
-    for (i, z) in whitened.iter().enumerate().filter(|(_, z)| z.abs() > OUT) {
+    for (i, z) in out {
         // The variance of the innovation that Student's t gives it, all of it in the samples that are new to the window.
         let more = (DEGREES + z * z) / (DEGREES + 1.0) - 1.0;
         loudness.burst[i] += more / whitener.new_share(i, noise, schedule, loudness);
-        found = true;
     }
-    found
+    true
 }
 
 #[cfg(test)]
@@ -85,19 +78,22 @@ mod tests {
     fn a_burst_is_found_where_it_begins_and_the_window_after_it_is_not_another() {
         let bursts = [500, 1700, 1701, 3100];
         let (schedule, mut loudness, x) = record(&bursts);
-        assert!(weigh_less(&mut loudness, &x, &NOISE, &schedule));
-        while weigh_less(&mut loudness, &x, &NOISE, &schedule) {}
+        let whitened = |loudness: &Loudness| Whitener::new(&NOISE, &schedule, loudness).whiten(&x);
+        let mut left = whitened(&loudness);
+        while weigh_less(&mut loudness, &left, &NOISE, &schedule) {
+            left = whitened(&loudness);
+        }
         let found: Vec<usize> = (0..schedule.len()).filter(|i| loudness.burst[*i] > 1.0).collect();
         assert!(!found.is_empty() && found.iter().all(|i| bursts.contains(i)), "{found:?}");
-        let whitened = Whitener::new(&NOISE, &schedule, &loudness).whiten(&x);
-        assert!(whitened.iter().all(|w| w.abs() < 5.0));
+        assert!(left.iter().all(|w| w.abs() < OUT));
     }
 
     #[test]
     fn gaussian_noise_has_none() {
         let (schedule, mut loudness, x) = record(&[]);
         let even = loudness.clone();
-        assert!(!weigh_less(&mut loudness, &x, &NOISE, &schedule));
+        let whitened = Whitener::new(&NOISE, &schedule, &loudness).whiten(&x);
+        assert!(!weigh_less(&mut loudness, &whitened, &NOISE, &schedule));
         assert_eq!(loudness, even);
     }
 }

@@ -260,7 +260,7 @@ pub struct Normal {
     y: DVector<f64>,
 }
 
-/// Inverse square of how much wider a prior is taken.
+/// Inverse square of how much wider a prior is taken where it must not decide: six times.
 const WIDE: f64 = 0.03;
 
 impl Normal {

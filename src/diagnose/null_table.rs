@@ -9,7 +9,7 @@
 //! stands for two or three records, and beyond they fall as exp(-T), the bound of Ville for evidence ratios. Where the probability
 //! itself matters, ask for the bootstrap.
 
-/// Log likelihood of slow noise, when nothing is left out, below which a record is quiet.
+/// Log likelihood of slow noise, when nothing is left out, below which a record is quiet: half of the nulls are.
 const QUIET: f64 = 2.5;
 
 /// Statistic, and the share of quiet records of noise alone that reach it.

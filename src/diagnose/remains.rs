@@ -19,7 +19,7 @@ const TOGETHER_S: f64 = 400.0;
 /// Shortest period of a line that is looked for, s, and the fewest cycles in the record.
 const LINE_S: f64 = 200.0;
 const CYCLES_MIN: usize = 8;
-/// Lines of the spectrum in the narrowest band in which the axes are compared.
+/// Lines of the spectrum in the narrowest band in which the axes are compared: fewer numbers than that correlate by chance.
 const LINES_MIN: usize = 4;
 /// Drifts of a line looked for: cycles by which its phase departs from that of a steady one over the record, and their spacing.
 const DRIFT_CYCLES: f64 = 100.0;

@@ -8,7 +8,7 @@ const BURSTS: Manner = Manner { other_physics: false, bursts: true };
 
 fn answer(kind: Kind, only: Option<&'static str>, manner: Manner) -> Diagnosis {
     let concealed = draw_order(&Order { kind, seed: 41, only, manner });
-    diagnose(&super::trial::case(&concealed.files), &Settings::default()).unwrap()
+    diagnose(&super::case(&concealed.files), &Settings::default()).unwrap()
 }
 
 fn weigh_less(answer: &Diagnosis) -> bool {

@@ -1,23 +1,13 @@
 //! A finding on trial, on concealed cases.
 
+use super::case;
 use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
-use oare_ground::diagnose::case::{Case, Header, Texts};
+use oare_ground::diagnose::case::Case;
 use oare_ground::diagnose::{Analysis, Settings, analyse};
 
 fn files(kind: Kind, seed: u64, only: &'static str) -> Vec<(String, String)> {
     draw_order(&Order { kind, seed, only: Some(only), manner: Manner::default() }).files
-}
-
-pub(crate) fn case(files: &[(String, String)]) -> Case {
-    let text = |name: &str| files.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone());
-    let texts = Texts {
-        recording: text("recording.csv"),
-        simulation: text("simulation.csv"),
-        ancillary: text("ancillary.csv"),
-        events: text("events.csv"),
-    };
-    Case::from_texts(Header::parse(&text("case.toml").unwrap(), &[]).unwrap(), &texts).unwrap()
 }
 
 fn analysed(case: &Case, bootstraps: usize) -> Analysis {

@@ -74,9 +74,6 @@ pub struct Fit {
     /// On data the fit has not seen.
     #[serde(default)]
     pub held_out: Option<HeldOut>,
-    /// Share of the effects predicted where it could be.
-    #[serde(default)]
-    pub confirmed: Option<f64>,
 }
 
 /// Prediction of data left out.

@@ -17,34 +17,31 @@ pub(super) fn crossings(grid: &[f64], series: &[f64], level: f64) -> Vec<(f64, f
     out
 }
 
-/// Sum of decays after instants, each forgetting the one before: exp(-(t - last)/tau).
+/// Decays after instants, each forgetting the one before: exp(-(t - last)/tau).
 pub(super) fn since(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f64> {
+    let next = |n: usize| instants.get(n + 1).map_or(f64::INFINITY, |(t, _)| *t);
+    decays(scene, instants, tau_s, next)
+}
+
+/// Decays after instants, each beside those before.
+fn added(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f64> {
+    decays(scene, instants, tau_s, |_| f64::INFINITY)
+}
+
+/// Sum of decays after instants, number `n` until the instant `ends(n)`.
+fn decays(scene: &Scene, instants: &[(f64, f64)], tau_s: f64, ends: impl Fn(usize) -> f64) -> Vec<f64> {
     let clock = scene.clock_s();
     let mut sum = vec![0.0; clock.len()];
     for (n, (instant, amplitude)) in instants.iter().enumerate() {
-        let next = instants.get(n + 1).map_or(f64::INFINITY, |(t, _)| *t);
+        let end = ends(n);
         let first = clock.partition_point(|t| t + HALF_WINDOW_S <= *instant);
-        let last = clock.partition_point(|t| t - HALF_WINDOW_S < next.min(instant + 12.0 * tau_s)).max(first);
+        let last = clock.partition_point(|t| t - HALF_WINDOW_S < end.min(instant + 12.0 * tau_s)).max(first);
         let pulse = decay(&clock[first..last], *instant, tau_s);
-        // What the next one replaces: the same decay continued after it.
-        let gone = if next.is_finite() { decay(&clock[first..last], next, tau_s) } else { vec![0.0; last - first] };
-        let left = if next.is_finite() { (-(next - instant) / tau_s).exp() } else { 0.0 };
+        // What goes at its end: the same decay continued after it.
+        let gone = if end.is_finite() { decay(&clock[first..last], end, tau_s) } else { vec![0.0; last - first] };
+        let left = if end.is_finite() { (-(end - instant) / tau_s).exp() } else { 0.0 };
         for ((total, p), g) in sum[first..last].iter_mut().zip(pulse).zip(gone) {
             *total += amplitude * (p - left * g);
-        }
-    }
-    sum
-}
-
-/// Sum of decays after instants, each beside those before.
-fn added(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f64> {
-    let clock = scene.clock_s();
-    let mut sum = vec![0.0; clock.len()];
-    for (instant, amplitude) in instants {
-        let first = clock.partition_point(|t| t + HALF_WINDOW_S <= *instant);
-        let last = clock.partition_point(|t| t - HALF_WINDOW_S < instant + 8.0 * tau_s).max(first);
-        for (total, pulse) in sum[first..last].iter_mut().zip(decay(&clock[first..last], *instant, tau_s)) {
-            *total += amplitude * pulse;
         }
     }
     sum
@@ -139,6 +136,7 @@ pub(super) fn events(c: &mut Collector) {
 /// A push some time after every entry of the log, that dies away, each beside those before: delays closer than the time it lasts, so
 /// that none falls between. Of what is logged all the time the delay is anyone's guess, and the last push alone is looked at.
 fn echoes(c: &mut Collector, kind: &str, ends: &[(f64, f64)]) {
+    // Beyond, the pushes of a long delay overlap into one, and adding them up is what takes time.
     const OFTEN: usize = 200;
     let s = c.scene;
     let mut members = Vec::new();

@@ -23,6 +23,21 @@ impl Weighed {
     pub fn frame(&self, scene: &Scene) -> Frame {
         Frame::new(&self.noise, &scene.schedule, &scene.loudness, &scene.residual_ng)
     }
+
+    /// The same, and the set whitened for it.
+    pub fn framed(&self, scene: &Scene, entries: &[Entry]) -> (Frame, Set) {
+        let frame = self.frame(scene);
+        let mut set = self.set.clone();
+        set.rewhiten(scene, &frame, entries);
+        (frame, set)
+    }
+
+    /// What the set leaves, whitened, and what is nuisance removed.
+    pub fn whitened_residual(&self, scene: &Scene, entries: &[Entry]) -> Axes {
+        let (frame, set) = self.framed(scene, entries);
+        let after = frame.with_data(&residual(scene, &frame, entries, &set));
+        std::array::from_fn(|k| after.data.projected(k, &after))
+    }
 }
 
 /// Residual of a set at the noise of a frame.

@@ -17,9 +17,7 @@ pub fn credible<'a>(
 ) -> Vec<&'a Weighed> {
     let mut kept = Vec::new();
     for w in sets {
-        let frame = w.frame(scene);
-        let mut set = w.set.clone();
-        set.rewhiten(scene, &frame, &library.entries);
+        let (frame, set) = w.framed(scene, &library.entries);
         let (mean, covariance) = set.coefficients(&frame, &library.entries);
         let mut next = 0;
         let mut reason = None;

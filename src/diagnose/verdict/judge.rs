@@ -48,6 +48,8 @@ pub fn judge<'a>(
         (false, _, _) => (Verdict::Consistent, None),
         (true, true, _) => (Verdict::Unexplained, open.1),
         (true, false, true) => (Verdict::Unexplained, best.1),
+        // Nothing listed at all, and an open form just above nothing.
+        (true, false, false) if listed.is_empty() => (Verdict::Unexplained, open.1),
         (true, false, false) => (Verdict::Explained, Some(simplest(listed))),
     };
     let on_trial = chosen.map(|weighed| (weighed, tried(scene, library, weighed)));

@@ -18,13 +18,14 @@ use self::named::name;
 use self::stands::tried;
 use self::unnamed::{hypothesis, of_failure, of_remains};
 use super::answer::{Diagnosis, Located, Verdict};
+use super::bursts::OUT;
 use super::catalogue::Effect;
 use super::design::Frame;
 use super::locate;
 use super::model::{self, MemberFit};
 use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
-use super::search::{self, Entry, Family, Set, Weighed};
+use super::search::{Entry, Family, Set, Weighed};
 use super::solve::{Library, Solution};
 
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
@@ -95,9 +96,7 @@ pub fn conclude(
             Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), tried, &mut answer.notes).0);
         return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder(library, solution));
     };
-    let frame = weighed.frame(scene);
-    let mut set = weighed.set.clone();
-    set.rewhiten(scene, &frame, &library.entries);
+    let (frame, set) = weighed.framed(scene, &library.entries);
     let (fit, inflation) = fit(scene, library, &frame, weighed, &set, tried, &mut notes);
     let fits = model::parameters(scene, &frame, &library.entries, &set, inflation);
     let contributions = set.contributions(scene, &frame, &library.entries);
@@ -140,14 +139,16 @@ fn ladder(library: &Library, solution: &Solution) -> Vec<(String, f64)> {
 fn of_windows(scene: &Scene) -> Vec<String> {
     let rough = scene.case.windows_too_rough;
     let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
-    let note = |count: usize, what: &str| (count > 0).then(|| format!("{count} {what}"));
-    [
-        note(rough, "windows are left out: the simulation changes too fast there for its own grid"),
-        note(bursts, "values out of the ordinary weigh less: more than 5 standard deviations of the noise"),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+    let mut notes = Vec::new();
+    if rough > 0 {
+        notes.push(format!("{rough} windows are left out: the simulation changes too fast there for its own grid"));
+    }
+    if bursts > 0 {
+        notes.push(format!(
+            "{bursts} values out of the ordinary weigh less: more than {OUT} standard deviations of the noise"
+        ));
+    }
+    notes
 }
 
 /// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.
@@ -159,12 +160,7 @@ fn with_remains(
     claim: f64,
 ) -> (Verdict, Option<Remains>) {
     let weighed = chosen.unwrap_or(&solution.null);
-    let frame = weighed.frame(scene);
-    let mut set = weighed.set.clone();
-    set.rewhiten(scene, &frame, &library.entries);
-    let left = search::residual(scene, &frame, &library.entries, &set);
-    let after = Frame::new(&weighed.noise, &scene.schedule, &scene.loudness, &left);
-    let whitened: Axes = std::array::from_fn(|k| after.data.projected(k, &after));
+    let whitened = weighed.whitened_residual(scene, &library.entries);
     let remains = remains::strongest(scene.clock_s(), &whitened, weighed.noise.map(|n| n.rms_ng()));
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
     let overturns = remains

@@ -22,7 +22,7 @@ pub fn of_failure(set: &str, failure: &str) -> Hypothesis {
         formula: "none".into(),
         axis: "x, y, z".into(),
         unit: "ng".into(),
-        location: format!("Where {set} would act, which comes nearest. {failure}."),
+        location: format!("Where {set} would act, which comes nearest; but {failure}."),
     }
 }
 
