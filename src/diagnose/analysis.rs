@@ -10,8 +10,9 @@ use super::error::CaseError;
 use super::null_table;
 use super::report::{CovariatePlate, Plates};
 use super::scene::{Axes, Scene};
-use super::solve::{Library, Solution};
+use super::solve::{Library, Solution, null_noise};
 use super::verdict;
+use crate::math::shared_work;
 
 /// How to analyse.
 #[derive(Debug, Clone)]
@@ -74,8 +75,9 @@ impl<'a> Prepared<'a> {
     /// As [`analyse`].
     pub fn new(case: &'a Case, settings: &Settings) -> Result<Self, CaseError> {
         let mut scene = Scene::new(case)?;
-        let library = Library::new(&scene, &settings.without);
-        let Some(solution) = solve_beside_bursts(&mut scene, &library, None, &|| false) else {
+        let (library, noise) =
+            shared_work::both(|| Library::new(&scene, &settings.without), || null_noise(&scene, None));
+        let Some(solution) = solve_beside_bursts(&mut scene, &library, noise, &|| false) else {
             unreachable!("nobody asked to stop")
         };
         Ok(Self { scene, library, solution, settings: settings.clone() })

@@ -13,7 +13,7 @@ use super::design::Frame;
 use super::noise::{self, AxisNoise};
 use super::scene::{Axes, Scene};
 use super::search::{self, Bank, Set};
-use super::solve::{Library, Solution, solve};
+use super::solve::{Library, Solution, null_noise, solve};
 use crate::math::shared_work;
 
 /// Log posterior odds by which the whole search may exceed the first look, since it joins effects, fits the noise anew and
@@ -88,7 +88,8 @@ impl<'a> Bootstrap<'a> {
     }
 
     fn searched(&self, residual: Axes) -> Solution {
-        solve(&self.scene.with_residual(residual), self.library, Some(&self.noise))
+        let scene = self.scene.with_residual(residual);
+        solve(&scene, self.library, null_noise(&scene, Some(&self.noise)))
     }
 
     fn noise_alone(&self, index: usize) -> Axes {

@@ -5,7 +5,7 @@
 
 use super::noise::{AxisNoise, Loudness, Schedule, Whitener};
 use super::scene::Scene;
-use super::solve::{Library, Solution, Stop, solve_unless};
+use super::solve::{Library, Solution, Stop, null_noise, solve_unless};
 
 /// Whitened residual beyond which samples are out of the ordinary: of Gaussian noise one record in a hundred has one such window.
 pub const OUT: f64 = 5.0;
@@ -19,13 +19,13 @@ const ROUNDS: usize = 3;
 pub fn solve_beside_bursts(
     scene: &mut Scene,
     library: &Library,
-    start: Option<&[AxisNoise; 3]>,
+    noise_null: [AxisNoise; 3],
     stop: Stop,
 ) -> Option<Solution> {
-    let mut solution = solve_unless(scene, library, start, stop)?;
+    let mut solution = solve_unless(scene, library, noise_null, stop)?;
     for _ in 1..ROUNDS {
         let best = solution.best();
-        let whitened = best.whitened_residual(scene, &library.entries);
+        let whitened = best.left(scene, &library.entries).whitened;
         let mut found = false;
         for k in 0..3 {
             found |= weigh_less(&mut scene.loudness[k], &whitened[k], &best.noise[k], &scene.schedule);
@@ -33,7 +33,7 @@ pub fn solve_beside_bursts(
         if !found {
             break;
         }
-        solution = solve_unless(scene, library, Some(&solution.null.noise), stop)?;
+        solution = solve_unless(scene, library, null_noise(scene, Some(&solution.null.noise)), stop)?;
     }
     Some(solution)
 }

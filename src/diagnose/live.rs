@@ -20,8 +20,9 @@ use super::noise::AxisNoise;
 use super::recorder::Usable;
 use super::report;
 use super::scene::{Scene, Surroundings};
-use super::solve::{Library, Stop};
+use super::solve::{Library, Stop, null_noise};
 use super::{null_table, verdict};
+use crate::math::shared_work;
 
 /// Looks kept for readers.
 const LOOKS_MAX: usize = 100;
@@ -219,8 +220,11 @@ impl Live {
             }
         };
         let mut scene = Scene::within(&case, self.surroundings.clone());
-        let library = Library::new(&scene, &self.policy.without);
-        let Some(solution) = solve_beside_bursts(&mut scene, &library, self.noise.as_ref(), stop) else { return false };
+        let (library, noise) = shared_work::both(
+            || Library::new(&scene, &self.policy.without),
+            || null_noise(&scene, self.noise.as_ref()),
+        );
+        let Some(solution) = solve_beside_bursts(&mut scene, &library, noise, stop) else { return false };
         self.noise = Some(solution.null.noise);
         let log_odds = solution.statistic();
         let probability = anytime_probability(log_odds);

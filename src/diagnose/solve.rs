@@ -3,7 +3,7 @@
 use super::catalogue::{self, Effect};
 use super::design::Frame;
 use super::noise::AxisNoise;
-use super::open_form::{self, Atom};
+use super::open_form::{self, Said};
 use super::scene::Scene;
 use super::search::{self, Bank, Entry, SET_MAX, Set, Weighed};
 use crate::math::shared_work;
@@ -27,8 +27,8 @@ pub struct Library {
     pub entries: Vec<Entry>,
     /// How many are listed.
     pub listed: usize,
-    /// The dictionary of open forms.
-    pub atoms: Vec<Atom>,
+    /// What is said of the open forms.
+    pub forms: Vec<Said>,
 }
 
 impl Library {
@@ -36,15 +36,19 @@ impl Library {
     pub fn new(scene: &Scene, without: &[String]) -> Self {
         let allowed: Vec<&'static Effect> =
             catalogue::ALL.iter().filter(|e| !without.iter().any(|id| id == e.id)).copied().collect();
-        let (entries, atoms) = shared_work::both(
+        let (entries, dictionary) = shared_work::both(
             || shared_work::map(&allowed, |effect| Entry::listed(scene, effect)),
             || open_form::dictionary(scene),
         );
         let mut entries: Vec<Entry> = entries.into_iter().flatten().collect();
         let listed = entries.len();
-        let share = OPEN_LOG_PRIOR - (atoms.len().max(1) as f64).ln();
-        entries.extend(atoms.iter().enumerate().map(|(i, atom)| Entry::open(i, atom, share)));
-        Self { entries, listed, atoms }
+        let share = OPEN_LOG_PRIOR - (dictionary.len().max(1) as f64).ln();
+        let mut forms = Vec::with_capacity(dictionary.len());
+        for (i, atom) in dictionary.into_iter().enumerate() {
+            entries.push(Entry::open(i, atom.shapes, share));
+            forms.push(atom.said);
+        }
+        Self { entries, listed, forms }
     }
 
     /// Whether a set holds an open form.
@@ -88,18 +92,22 @@ impl Solution {
     }
 }
 
-/// Search and weigh. `start` is a first guess of the noise, when one is at hand.
-pub fn solve(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>) -> Solution {
-    match solve_unless(scene, library, start, &|| false) {
+/// The noise when nothing is left out; `start` is a first guess, when one is at hand.
+pub fn null_noise(scene: &Scene, start: Option<&[AxisNoise; 3]>) -> [AxisNoise; 3] {
+    search::fit_noise(scene, &scene.residual_ng, start, if start.is_some() { 50 } else { 110 })
+}
+
+/// Search and weigh, from the noise when nothing is left out.
+pub fn solve(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3]) -> Solution {
+    match solve_unless(scene, library, noise_null, &|| false) {
         Some(solution) => solution,
         None => unreachable!("nobody asked to stop"),
     }
 }
 
 /// As [`solve`], and `None` as soon as `stop` says so: it is asked every second or so of work.
-pub fn solve_unless(scene: &Scene, library: &Library, start: Option<&[AxisNoise; 3]>, stop: Stop) -> Option<Solution> {
+pub fn solve_unless(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3], stop: Stop) -> Option<Solution> {
     let entries = &library.entries;
-    let noise_null = search::fit_noise(scene, &scene.residual_ng, start, if start.is_some() { 50 } else { 110 });
     let null = search::weigh_with_own_noise(scene, entries, &Set::default(), &noise_null, 0, 0);
     let (pool, singles) = converged(scene, library, &noise_null, stop)?;
     let (mut listed, mut open) = pool.weigh(scene, entries, OWN_NOISE, stop)?;
@@ -219,7 +227,8 @@ fn converged(
         if round == 0 {
             let nothing = Set::default();
             let chosen = nothing.chosen(&frame);
-            singles = (0..entries.len()).map(|i| (i, search::best_of_entry(&bank, i, &chosen).0)).collect();
+            let ids: Vec<usize> = (0..entries.len()).collect();
+            singles = shared_work::map(&ids, |i| (*i, search::best_of_entry(&bank, *i, &chosen).0));
         }
         let pool = Pool::found(scene, library, &frame, &bank, noise, stop)?;
         let again = pool.top().filter(|top| top.score >= WORTH_A_REFIT && round < 2 && top.key() != best_key);

@@ -198,8 +198,6 @@ pub fn no_volume(_: &Scene) -> f64 {
 
 /// Prior odds of an effect that is met as often as any other: about one in fifty records each.
 pub const COMMON: f64 = -4.0;
-/// Prior odds of one that is met less often.
-pub const RARE: f64 = -6.0;
 
 /// Three coefficients of a push fixed in the body.
 pub const fn push(size_ng: f64, size_max_ng: f64) -> [Linear; 3] {

@@ -9,10 +9,12 @@
 //! The amplitude of the slow part is estimated on a logarithmic scale with a prior: it never reaches zero, and a
 //! record too short to exclude slow noise is treated as having some. That is what keeps false leaks away.
 
+mod binned;
 mod filter;
 mod loudness;
 mod marginal;
 
+pub use binned::{BIN_S, Binned};
 pub use filter::Whitener;
 use filter::products;
 pub use loudness::Loudness;

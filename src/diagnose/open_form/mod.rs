@@ -10,6 +10,7 @@ mod motion;
 mod places;
 mod surroundings;
 
+use crate::math::shared_work;
 use crate::physics::Vec3;
 
 use super::catalogue::Shape;
@@ -19,22 +20,22 @@ use super::scene::{Axes, Scene};
 /// Prior size of the coefficient of a form, ng.
 pub const SIZE_NG: f64 = 30.0;
 
-/// A form at one value of what is free in it.
-pub struct Form {
-    /// The formula.
-    pub formula: String,
-    /// Its series.
-    pub shape: Shape,
-}
-
-/// A family of forms, weighed together: one form, or the same form at several widths, delays or places.
-pub struct Atom {
+/// What is said of a family of forms.
+pub struct Said {
     /// Covariate it belongs to.
     pub covariate: &'static str,
     /// Where it lives, in words.
     pub location: &'static str,
-    /// Its forms.
-    pub forms: Vec<Form>,
+    /// The formula of each form.
+    pub formulas: Vec<String>,
+}
+
+/// A family of forms, weighed together: one form, or the same form at several widths, delays or places.
+pub struct Atom {
+    /// In words.
+    pub said: Said,
+    /// The series of each form.
+    pub shapes: Vec<Shape>,
 }
 
 struct Collector<'a> {
@@ -73,14 +74,12 @@ impl Collector<'_> {
         location: &'static str,
         members: impl IntoIterator<Item = (String, Vec<f64>)>,
     ) {
-        let forms: Vec<Form> = members
+        let (formulas, shapes): (Vec<String>, Vec<Shape>) = members
             .into_iter()
-            .filter_map(|(formula, series)| {
-                standard(&series).map(|series| Form { formula, shape: Shape::Scalar(series) })
-            })
-            .collect();
-        if !forms.is_empty() {
-            self.atoms.push(Atom { covariate, location, forms });
+            .filter_map(|(formula, series)| standard(&series).map(|series| (formula, Shape::Scalar(series))))
+            .unzip();
+        if !shapes.is_empty() {
+            self.atoms.push(Atom { said: Said { covariate, location, formulas }, shapes });
         }
     }
 
@@ -92,8 +91,8 @@ impl Collector<'_> {
         location: &'static str,
         columns: Vec<Raw>,
     ) {
-        let form = Form { formula: formula.into(), shape: Shape::Columns(columns) };
-        self.atoms.push(Atom { covariate, location, forms: vec![form] });
+        let said = Said { covariate, location, formulas: vec![formula.into()] };
+        self.atoms.push(Atom { said, shapes: vec![Shape::Columns(columns)] });
     }
 
     /// Several numbers on the grid, each with a coefficient on every body axis.
@@ -153,20 +152,28 @@ fn standard_vector(axes: &Axes) -> Option<Axes> {
         .then(|| std::array::from_fn(|k| axes[k].iter().map(|x| (x - mean[k]) / deviation).collect()))
 }
 
+/// Those who fill the dictionary.
+const COLLECTED: [fn(&mut Collector); 10] = [
+    motion::rates,
+    motion::orbit,
+    surroundings::sunlight,
+    history::terminator,
+    surroundings::field,
+    surroundings::surroundings,
+    instrument::sensor,
+    history::events,
+    history::clock,
+    places::places,
+];
+
 /// The dictionary for a case.
 pub fn dictionary(scene: &Scene) -> Vec<Atom> {
-    let mut c = Collector { scene, atoms: Vec::new() };
-    motion::rates(&mut c);
-    motion::orbit(&mut c);
-    surroundings::sunlight(&mut c);
-    history::terminator(&mut c);
-    surroundings::field(&mut c);
-    surroundings::surroundings(&mut c);
-    instrument::sensor(&mut c);
-    history::events(&mut c);
-    history::clock(&mut c);
-    places::places(&mut c);
-    c.atoms
+    let collected = |collect: &fn(&mut Collector)| {
+        let mut c = Collector { scene, atoms: Vec::new() };
+        collect(&mut c);
+        c.atoms
+    };
+    shared_work::map(&COLLECTED, collected).into_iter().flatten().collect()
 }
 
 const AXIS: [&str; 3] = ["x", "y", "z"];

@@ -12,11 +12,10 @@ use nalgebra::{DMatrix, DVector};
 
 pub use imitate::imitation;
 pub use refine::refine;
-pub use weigh::{Weighed, fit_noise, residual, weigh_with_own_noise};
+pub use weigh::{Left, Weighed, fit_noise, residual, weigh_with_own_noise};
 
 use super::catalogue::{Effect, Shape, Theta};
 use super::design::{Chosen, Column, Frame, OnAxis};
-use super::open_form::Atom;
 use super::scene::{Axes, Scene};
 use crate::math::shared_work;
 
@@ -78,9 +77,9 @@ impl Entry {
     }
 
     /// An open form.
-    pub fn open(index: usize, atom: &Atom, log_prior: f64) -> Self {
-        let count = match &atom.forms[0].shape {
-            Shape::Columns(columns) => columns.len(),
+    pub fn open(index: usize, shapes: Vec<Shape>, log_prior: f64) -> Self {
+        let count = match shapes.first() {
+            Some(Shape::Columns(columns)) => columns.len(),
             _ => 3,
         };
         let sizes = vec![super::open_form::SIZE_NG; count];
@@ -88,7 +87,7 @@ impl Entry {
             family: Family::Open(index),
             log_prior,
             log_volume: 0.0,
-            points: atom.forms.iter().enumerate().map(|(i, f)| ([i as f64, 0.0], f.shape.clone())).collect(),
+            points: shapes.into_iter().enumerate().map(|(i, shape)| ([i as f64, 0.0], shape)).collect(),
             sizes,
         }
     }

@@ -18,6 +18,14 @@ pub struct Weighed {
     pub slow_evidence: f64,
 }
 
+/// What a set leaves at the windows.
+pub struct Left {
+    /// In ng.
+    pub residual_ng: Axes,
+    /// Whitened, and what is nuisance removed.
+    pub whitened: Axes,
+}
+
 impl Weighed {
     /// The residual of the scene, behind the filters of this noise.
     pub fn frame(&self, scene: &Scene) -> Frame {
@@ -32,11 +40,12 @@ impl Weighed {
         (frame, set)
     }
 
-    /// What the set leaves, whitened, and what is nuisance removed.
-    pub fn whitened_residual(&self, scene: &Scene, entries: &[Entry]) -> Axes {
+    /// What the set leaves.
+    pub fn left(&self, scene: &Scene, entries: &[Entry]) -> Left {
         let (frame, set) = self.framed(scene, entries);
-        let after = frame.with_data(&residual(scene, &frame, entries, &set));
-        std::array::from_fn(|k| after.data.projected(k, &after))
+        let residual_ng = residual(scene, &frame, entries, &set);
+        let after = frame.with_data(&residual_ng);
+        Left { whitened: std::array::from_fn(|k| after.data.projected(k, &after)), residual_ng }
     }
 }
 

@@ -48,7 +48,7 @@ fn ids(library: &Library, set: &Set) -> Vec<String> {
         .iter()
         .map(|m| match library.entries[m.entry].family {
             Family::Listed(effect) => effect.id.to_string(),
-            Family::Open(i) => library.atoms[i].forms[m.theta[0] as usize].formula.clone(),
+            Family::Open(i) => library.forms[i].formulas[m.theta[0] as usize].clone(),
         })
         .collect()
 }
@@ -160,8 +160,8 @@ fn with_remains(
     claim: f64,
 ) -> (Verdict, Option<Remains>) {
     let weighed = chosen.unwrap_or(&solution.null);
-    let whitened = weighed.whitened_residual(scene, &library.entries);
-    let remains = remains::strongest(scene.clock_s(), &whitened, weighed.noise.map(|n| n.rms_ng()));
+    let left = weighed.left(scene, &library.entries);
+    let remains = remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness);
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
     let overturns = remains
         .as_ref()
@@ -181,7 +181,7 @@ fn why_here(best: &Best) -> &'static str {
 fn covariate(library: &Library, entry: usize) -> String {
     match library.entries[entry].family {
         Family::Listed(effect) => effect.id.to_string(),
-        Family::Open(i) => library.atoms[i].covariate.to_string(),
+        Family::Open(i) => library.forms[i].covariate.to_string(),
     }
 }
 

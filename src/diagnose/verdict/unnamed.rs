@@ -48,16 +48,16 @@ pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins
     let mut axis = Vec::new();
     let mut location = Vec::new();
     for (i, m) in best.set.members.iter().enumerate() {
-        let Family::Open(atom) = library.entries[m.entry].family else { continue };
+        let Family::Open(form) = library.entries[m.entry].family else { continue };
         let amplitudes: Vec<String> =
             best.fits[i].parameters.iter().map(|p| format!("{:.1}({:.1})", p.value, p.sigma)).collect();
         formula.push(format!(
             "[{}] x {}, scaled to unit deviation",
             amplitudes.join(", "),
-            library.atoms[atom].forms[m.theta[0] as usize].formula
+            library.forms[form].formulas[m.theta[0] as usize]
         ));
         axis.push(m.axis.map_or("x, y, z", |a| ["x", "y", "z"][a]));
-        location.push(library.atoms[atom].location);
+        location.push(library.forms[form].location);
     }
     let failing = if fails.is_empty() { String::new() } else { format!(" Near catalogue effects fail: {fails}.") };
     Hypothesis {

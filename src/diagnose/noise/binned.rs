@@ -1,0 +1,114 @@
+//! A residual in bins that are long beside the quick noise: the mean of each, and the variance that the quick noise gives it.
+
+use super::{AxisNoise, Loudness, Schedule};
+
+/// Length of a bin, s: several correlation times of the short part.
+pub const BIN_S: f64 = 400.0;
+/// Fewest windows of a bin.
+const WINDOWS_MIN: usize = 4;
+
+/// A residual in bins, from the first window to the last; a bin with too few windows has no mean and an infinite variance.
+#[derive(Debug, Clone)]
+pub struct Binned {
+    /// Means, ng.
+    pub mean_ng: Vec<f64>,
+    /// Their variances by white and short noise, ng^2.
+    pub variance_ng2: Vec<f64>,
+}
+
+impl Binned {
+    /// Of a residual at the windows. Windows in which a burst is are left out.
+    pub fn new(residual_ng: &[f64], noise: &AxisNoise, schedule: &Schedule, loudness: &Loudness) -> Self {
+        let bin = |i: usize| ((schedule.clock_s[i] - schedule.clock_s[0]) / BIN_S) as usize;
+        let n = schedule.len();
+        let bins = if n == 0 { 0 } else { bin(n - 1) + 1 };
+        let mut binned = Self { mean_ng: vec![0.0; bins], variance_ng2: vec![f64::INFINITY; bins] };
+        let bursts = |i: usize| loudness.burst[i] > 1.0 || (i > 0 && loudness.burst[i - 1] > 1.0);
+        let mut first = 0;
+        while first < n {
+            let after = (first..n).find(|i| bin(*i) > bin(first)).unwrap_or(n);
+            let windows: Vec<usize> = (first..after).filter(|i| !bursts(*i)).collect();
+            if windows.len() >= WINDOWS_MIN {
+                let count = windows.len() as f64;
+                binned.mean_ng[bin(first)] = windows.iter().map(|i| residual_ng[*i]).sum::<f64>() / count;
+                binned.variance_ng2[bin(first)] =
+                    variance_of_sum(&windows, noise, schedule, &loudness.activity) / (count * count);
+            }
+            first = after;
+        }
+        binned
+    }
+
+    /// Log likelihood of white and short noise beside slow noise, a constant fitted.
+    pub fn log_likelihood_of_slow_noise(&self, slow_ng: f64, slow_tau_s: f64) -> f64 {
+        let keep = (-BIN_S / slow_tau_s).exp();
+        let variance = slow_ng * slow_ng;
+        let (mut state, mut p) = ([0.0; 2], variance);
+        let (mut log_det, mut squares) = (0.0, [0.0; 3]);
+        for (mean, noise) in self.mean_ng.iter().zip(&self.variance_ng2) {
+            if noise.is_finite() {
+                let innovation = [mean - state[0], 1.0 - state[1]];
+                let total = p + noise;
+                log_det += total.ln();
+                squares[0] += innovation[0] * innovation[0] / total;
+                squares[1] += innovation[0] * innovation[1] / total;
+                squares[2] += innovation[1] * innovation[1] / total;
+                state = std::array::from_fn(|i| state[i] + p / total * innovation[i]);
+                p *= noise / total;
+            }
+            state = state.map(|x| keep * x);
+            p = keep * keep * p + (1.0 - keep * keep) * variance;
+        }
+        let [dd, dc, cc] = squares;
+        if cc > 0.0 { -0.5 * (log_det + dd - dc * dc / cc) } else { 0.0 }
+    }
+}
+
+/// Variance of the sum of some windows, in order.
+fn variance_of_sum(windows: &[usize], noise: &AxisNoise, schedule: &Schedule, activity: &[f64]) -> f64 {
+    let [white, short] = [noise.white_ng.powi(2), noise.short_ng.powi(2)];
+    let mut sum = 0.0;
+    for (a, i) in windows.iter().enumerate() {
+        sum += activity[*i].powi(2) * (white + short);
+        for j in &windows[a + 1..] {
+            let apart = schedule.clock_s[*j] - schedule.clock_s[*i];
+            let shared = if *j == i + 1 { schedule.overlap[*j][1] * schedule.overlap[*i][0] * white } else { 0.0 };
+            sum += 2.0 * activity[*i] * activity[*j] * (shared + short * (-apart / noise.short_tau_s).exp());
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::noise::simulate;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn means_scatter_as_their_variances_say_and_gaps_and_bursts_are_left_out() {
+        let clock: Vec<f64> = (0..40_000).filter(|i| i % 190 > 20).map(|i| 25.0 * f64::from(i)).collect();
+        let schedule = Schedule::new(&clock);
+        let noise = AxisNoise { white_ng: 100.0, short_ng: 25.0, short_tau_s: 90.0, slow_ng: 0.0, slow_tau_s: 3000.0 };
+        let mut loudness = Loudness::even((0..clock.len()).map(|i| if i > 15_000 { 0.6 } else { 1.2 }).collect());
+        loudness.burst.iter_mut().step_by(50).for_each(|b| *b = 300.0);
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+        let x = simulate(&noise, &schedule, &loudness, || StandardNormal.sample(&mut rng));
+        let binned = Binned::new(&x, &noise, &schedule, &loudness);
+        let seen: Vec<f64> = binned
+            .mean_ng
+            .iter()
+            .zip(&binned.variance_ng2)
+            .filter(|(_, v)| v.is_finite())
+            .map(|(m, v)| m * m / v)
+            .collect();
+        assert!(seen.len() > 2000 && seen.len() < binned.mean_ng.len());
+        let n = seen.len() as f64;
+        let variance = seen.iter().sum::<f64>() / n;
+        assert!((variance - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "{variance}");
+        // Noise without a slow part is likeliest as such.
+        let likelihood = |slow_ng| binned.log_likelihood_of_slow_noise(slow_ng, 3000.0);
+        assert!(likelihood(0.3) > likelihood(20.0) + 10.0);
+    }
+}

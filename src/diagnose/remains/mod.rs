@@ -1,0 +1,91 @@
+//! Whether structure remains when the best hypothesis has been taken away, even of a form that no dictionary has.
+//!
+//! Two questions to the whitened residual, which is white and independent from axis to axis where the hypothesis is whole:
+//! do the axes move together in some band of periods (a push along one direction of the body at whatever instants does that), and
+//! is there a line, of constant or of steadily drifting period? And one to the residual itself: does it switch between two levels,
+//! where slow noise would wander? Not here: what it could be.
+
+mod grid;
+mod line;
+mod switching;
+mod together;
+
+use self::grid::Grid;
+use super::noise::{AxisNoise, Binned, Loudness, Schedule};
+use super::search::Left;
+
+/// Questions asked.
+const QUESTIONS: f64 = 3.0;
+
+/// Structure that remains.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Remains {
+    /// Probability that white, independent residuals show as much, all questions counted.
+    pub probability: f64,
+    /// Its whitened energy: the square of its signal-to-noise ratio, about.
+    pub energy: f64,
+    /// In words: its form.
+    pub form: String,
+    /// In words: its axis or direction, body axes.
+    pub axis: String,
+    /// Axes with a share in it.
+    pub axes: Vec<String>,
+    /// In words: where it lives.
+    pub location: String,
+}
+
+/// What remains of what a hypothesis leaves, at its noise. The least probable of all that was asked.
+pub fn strongest(
+    left: &Left,
+    noise: &[AxisNoise; 3],
+    schedule: &Schedule,
+    loudness: &[Loudness; 3],
+) -> Option<Remains> {
+    let grid = Grid::new(&schedule.clock_s, &left.whitened);
+    let scale_ng = noise.map(|n| n.rms_ng());
+    let binned: [Binned; 3] =
+        std::array::from_fn(|k| Binned::new(&left.residual_ng[k], &noise[k], schedule, &loudness[k]));
+    [
+        grid.as_ref().and_then(|grid| together::together(grid, scale_ng)),
+        grid.as_ref().and_then(|grid| line::line(grid, scale_ng)),
+        switching::switching(&binned),
+    ]
+    .into_iter()
+    .flatten()
+    .min_by(|a, b| a.probability.total_cmp(&b.probability))
+    .map(|r| Remains { probability: (QUESTIONS * r.probability).min(1.0), ..r })
+}
+
+/// Axes that carry at least a twentieth of the energy.
+fn sharing(amplitude: [f64; 3]) -> Vec<String> {
+    let total: f64 = amplitude.iter().map(|a| a * a).sum();
+    let named = ["x", "y", "z"].iter().zip(amplitude);
+    named.filter(|(_, a)| a * a > 0.05 * total).map(|(name, _)| (*name).to_string()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::noise::{Whitener, simulate};
+    use crate::diagnose::scene::Axes;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn noise_alone_leaves_nothing() {
+        let noise = AxisNoise { white_ng: 80.0, short_ng: 15.0, short_tau_s: 100.0, slow_ng: 12.0, slow_tau_s: 4000.0 };
+        let clock_s: Vec<f64> = (0..5000).filter(|i| i % 170 > 4).map(|i| 25.0 * f64::from(i)).collect();
+        let schedule = Schedule::new(&clock_s);
+        let loudness: [Loudness; 3] = std::array::from_fn(|_| Loudness::even(vec![1.0; clock_s.len()]));
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(6);
+        // A hundred records: a probability below a thousandth has one chance in ten among them.
+        for _ in 0..100 {
+            let residual_ng: Axes =
+                std::array::from_fn(|k| simulate(&noise, &schedule, &loudness[k], || StandardNormal.sample(&mut rng)));
+            let whitened =
+                std::array::from_fn(|k| Whitener::new(&noise, &schedule, &loudness[k]).whiten(&residual_ng[k]));
+            let found = strongest(&Left { residual_ng, whitened }, &[noise; 3], &schedule, &loudness);
+            assert!(found.is_none_or(|r| r.probability > 1e-3));
+        }
+    }
+}
