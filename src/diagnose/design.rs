@@ -187,10 +187,13 @@ impl Frame {
 
     /// Whiten many regressors, each by its series on the axes it acts on: those of an axis side by side.
     pub fn columns(&self, many: &[Vec<OnAxis>]) -> Vec<Column> {
+        let spans: Vec<Vec<[usize; 2]>> =
+            shared_work::map(many, |parts| parts.iter().map(|part| span(part.series)).collect());
         let flat: Vec<(usize, OnAxis, [usize; 2])> = many
             .iter()
+            .zip(spans)
             .enumerate()
-            .flat_map(|(owner, parts)| parts.iter().map(move |part| (owner, *part, span(part.series))))
+            .flat_map(|(owner, (parts, spans))| parts.iter().zip(spans).map(move |(part, span)| (owner, *part, span)))
             .collect();
         let mut order: Vec<usize> = (0..flat.len()).collect();
         order.sort_by_key(|i| (flat[*i].1.axis, flat[*i].2));

@@ -12,7 +12,7 @@ pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> 
 
 /// The result of each item, in their order.
 pub fn map<T: Sync, U: Send>(items: &[T], of: impl Fn(&T) -> U + Sync + Send) -> Vec<U> {
-    items.par_iter().map(of).collect()
+    items.par_iter().with_max_len(1).map(of).collect()
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::filter::products;
 use super::{AxisNoise, Loudness, Schedule};
+use crate::math::shared_work;
 
 /// Amplitudes, ng, and correlation times, s, of the slow part over which it is marginalised: each about the middle of its share of
 /// an axis of logarithms.
@@ -44,14 +45,15 @@ pub fn slow_part_marginalised(
         }
     }
     let whole = (SLOW_AMPLITUDES_NG[11] / SLOW_AMPLITUDES_NG[0]).ln() * SLOW_TIMES_S.len() as f64;
-    let mut likelihoods: Vec<f64> = Vec::with_capacity(trials.len());
-    for group in trials.chunks(LANES) {
+    let groups: Vec<&[(usize, AxisNoise, f64)]> = trials.chunks(LANES).collect();
+    let weighed = |group: &&[(usize, AxisNoise, f64)]| {
         let lane: [&(usize, AxisNoise, f64); LANES] = std::array::from_fn(|l| &group[l.min(group.len() - 1)]);
         let found =
             products(&lane.map(|t| t.1), schedule, lane.map(|t| &loudness[t.0]), lane.map(|t| &residual_ng[t.0][..]));
         let likelihood = |([dd, dc, cc], log_det): ([f64; 3], f64)| -0.5 * (log_det + dd - dc * dc / cc + cc.ln());
-        likelihoods.extend(found.into_iter().take(group.len()).map(likelihood));
-    }
+        found.into_iter().take(group.len()).map(likelihood).collect::<Vec<f64>>()
+    };
+    let likelihoods: Vec<f64> = shared_work::map(&groups, weighed).into_iter().flatten().collect();
     let per_axis = trials.len() / 3;
     let axes = trials.chunks(per_axis).zip(likelihoods.chunks(per_axis));
     let mut all = SlowPart { above_fit: 0.0, above_none: 0.0 };
