@@ -24,7 +24,7 @@ pub struct Diagnosis {
     pub located: Located,
     /// What the simulation lacks, in order of posterior. Empty unless `explained` or `ambiguous`.
     pub effects: Vec<EffectAnswer>,
-    /// Other sets that remain possible.
+    /// Other sets that remain possible; where nothing is claimed, those that come nearest.
     pub alternatives: Vec<Alternative>,
     /// A formula for what nothing in the catalogue explains.
     pub hypothesis: Option<Hypothesis>,

@@ -7,6 +7,7 @@ mod imitators;
 mod judge;
 mod limits;
 mod named;
+mod nearest;
 mod stands;
 mod unnamed;
 
@@ -15,6 +16,7 @@ use self::fit::fit;
 use self::judge::{Judged, judge};
 use self::limits::upper_limits;
 use self::named::name;
+use self::nearest::nearest;
 use self::stands::tried;
 use self::unnamed::{hypothesis, of_failure, of_remains};
 use super::answer::{Diagnosis, Located, Verdict};
@@ -90,6 +92,9 @@ pub fn conclude(
         if let Some(r) = remains.filter(|_| verdict == Verdict::Unexplained) {
             answer.located.axes.clone_from(&r.axes);
             answer.hypothesis = Some(of_remains(&r, ""));
+        }
+        if verdict == Verdict::Consistent && failure.is_none() {
+            answer.alternatives = nearest(library, &solution.null, &listed);
         }
         answer.upper_limits = upper_limits(scene, library, &null_frame, &Set::default());
         answer.fit =
