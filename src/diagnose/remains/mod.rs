@@ -5,6 +5,7 @@
 //! is there a line, of constant or of steadily drifting period? And one to the residual itself: does it switch between two levels,
 //! where slow noise would wander? Not here: what it could be.
 
+mod chain;
 mod grid;
 mod line;
 mod switching;

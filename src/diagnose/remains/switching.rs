@@ -1,11 +1,11 @@
 //! Does the residual switch between two levels, where slow noise would wander?
 //!
 //! A push that goes on and off at instants of no log (a valve that sticks, an instrument of two states) has the spectrum of slow
-//! noise; what tells them apart is that the levels are two. A hidden Markov chain of two states, its levels and rates fitted by
-//! expectation and maximisation (Baum et al. 1970), against slow noise at its best, both on bins of the residual. The ratio of a
-//! likelihood that is charged for its free numbers (Schwarz 1978) to the best likelihood of noise exceeds x in at most one record of
-//! noise in x (Wasserman et al. 2020).
+//! noise; what tells them apart is that the levels are two. A hidden Markov chain of two states against slow noise at its best, both on
+//! bins of the residual. The ratio of a likelihood that is charged for its free numbers (Schwarz 1978) to the best likelihood of noise
+//! exceeds x in at most one record of noise in x (Wasserman et al. 2020).
 
+use super::chain::Chain;
 use super::{Remains, sharing};
 use crate::diagnose::noise::{BIN_S, Binned};
 use crate::math::shared_work;
@@ -19,8 +19,6 @@ const SLOW_TAU_S: [f64; 6] = [300.0, 700.0, 1500.0, 3000.0, 6500.0, 14_000.0];
 const ROUNDS: [usize; 2] = [25, 10];
 /// Log evidence of the axis that begins above which it is carried on to others.
 const WORTH_MORE_AXES: f64 = -10.0;
-/// A state lasts between one bin and a third of them.
-const LEAVES: [f64; 2] = [0.01, 0.5];
 /// Bins over which a residual is smoothed to begin with.
 const SMOOTH: [usize; 2] = [1, 4];
 
@@ -59,7 +57,7 @@ pub(super) fn switching(binned: &[Binned; 3]) -> Option<Remains> {
     let (above, axes, chain) = found.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
     let mut push_ng = [0.0; 3];
     axes.iter().zip(&chain.levels).for_each(|(k, [down, up])| push_ng[*k] = up - down);
-    let [on_s, off_s] = chain.leaves.map(|p| BIN_S / p);
+    let [off_s, on_s] = chain.leaves.map(|p| BIN_S / p);
     Some(Remains {
         probability: (AXES.len() as f64 * (-above).exp()).min(1.0),
         energy: chain.energy(axes, binned),
@@ -77,129 +75,6 @@ pub(super) fn switching(binned: &[Binned; 3]) -> Option<Remains> {
 fn likeliest_slow_noise(binned: &Binned) -> f64 {
     let of = |slow_ng: &f64| SLOW_TAU_S.map(|tau_s| binned.log_likelihood_of_slow_noise(*slow_ng, tau_s));
     SLOW_NG.iter().flat_map(of).fold(f64::NEG_INFINITY, f64::max)
-}
-
-/// A chain of two states that several series share.
-struct Chain {
-    /// Probability of being up, per bin.
-    up: Vec<f64>,
-    /// Levels down and up of each series, ng.
-    levels: Vec<[f64; 2]>,
-    /// Probability per bin to leave up, and to leave down.
-    leaves: [f64; 2],
-    log_likelihood: f64,
-    switches: f64,
-}
-
-impl Chain {
-    /// Up where the smoothed series is above its mean.
-    fn begin(series: &Binned, smooth: usize) -> Option<Vec<f64>> {
-        let weight: Vec<f64> = series.variance_ng2.iter().map(|v| 1.0 / v).collect();
-        let mean_of = |range: std::ops::Range<usize>| {
-            let (sum, all) = range.fold((0.0, 0.0), |(s, w), i| (s + weight[i] * series.mean_ng[i], w + weight[i]));
-            if all > 0.0 { sum / all } else { f64::NAN }
-        };
-        let n = weight.len();
-        let middle = mean_of(0..n);
-        let up: Vec<f64> = (0..n)
-            .map(|i| match mean_of(i.saturating_sub(smooth)..(i + smooth + 1).min(n)) {
-                x if x.is_nan() => 0.5,
-                x => f64::from(x > middle),
-            })
-            .collect();
-        middle.is_finite().then_some(up)
-    }
-
-    /// Levels and rates, by expectation and maximisation from a first guess of when it is up.
-    fn fitted(series: &[&Binned], up: Vec<f64>, rounds: usize) -> Option<Self> {
-        let mut chain = Self { up, levels: Vec::new(), leaves: [0.1; 2], log_likelihood: 0.0, switches: 0.0 };
-        for _ in 0..rounds {
-            chain.levels = series.iter().map(|s| levels(s, &chain.up)).collect::<Option<Vec<[f64; 2]>>>()?;
-            chain.expect(series);
-        }
-        chain.log_likelihood.is_finite().then_some(chain)
-    }
-
-    /// Where it is at these levels and rates, its likelihood, and the rates that this makes likeliest.
-    fn expect(&mut self, series: &[&Binned]) {
-        let n = self.up.len();
-        let log_density = |i: usize, state: usize| -> f64 {
-            let each = series.iter().zip(&self.levels).filter(|(s, _)| s.variance_ng2[i].is_finite());
-            each.map(|(s, l)| -0.5 * (s.mean_ng[i] - l[state]).powi(2) / s.variance_ng2[i]).sum()
-        };
-        let [leave_up, leave_down] = self.leaves;
-        let next =
-            |p: [f64; 2]| [p[0] * (1.0 - leave_down) + p[1] * leave_up, p[0] * leave_down + p[1] * (1.0 - leave_up)];
-        let mut densities = Vec::with_capacity(n);
-        let mut forward: Vec<[f64; 2]> = Vec::with_capacity(n);
-        let finite = |s: &&Binned| s.variance_ng2.iter().filter(|v| v.is_finite()).map(|v| v.ln()).sum::<f64>();
-        let mut log_likelihood = -0.5 * series.iter().map(finite).sum::<f64>();
-        let mut p = [leave_up / (leave_up + leave_down), leave_down / (leave_up + leave_down)];
-        for i in 0..n {
-            let logs = [log_density(i, 0), log_density(i, 1)];
-            let top = logs[0].max(logs[1]);
-            let density = logs.map(|l| (l - top).exp());
-            let joint = [p[0] * density[0], p[1] * density[1]];
-            let sum = joint[0] + joint[1];
-            log_likelihood += top + sum.ln();
-            forward.push(joint.map(|x| x / sum));
-            densities.push(density);
-            p = next(forward[i]);
-        }
-        let mut backward = [1.0; 2];
-        let (mut stays, mut left) = ([0.0; 2], [0.0; 2]);
-        for i in (0..n).rev() {
-            let both = [forward[i][0] * backward[0], forward[i][1] * backward[1]];
-            self.up[i] = both[1] / (both[0] + both[1]);
-            if i == 0 {
-                break;
-            }
-            let ahead = [densities[i][0] * backward[0], densities[i][1] * backward[1]];
-            let moves = [
-                [forward[i - 1][0] * (1.0 - leave_down) * ahead[0], forward[i - 1][0] * leave_down * ahead[1]],
-                [forward[i - 1][1] * leave_up * ahead[0], forward[i - 1][1] * (1.0 - leave_up) * ahead[1]],
-            ];
-            let all: f64 = moves.iter().flatten().sum();
-            stays[0] += moves[0][0] / all;
-            left[0] += moves[0][1] / all;
-            left[1] += moves[1][0] / all;
-            stays[1] += moves[1][1] / all;
-            backward = [
-                (1.0 - leave_down) * ahead[0] + leave_down * ahead[1],
-                leave_up * ahead[0] + (1.0 - leave_up) * ahead[1],
-            ];
-            let scale = backward[0] + backward[1];
-            backward = backward.map(|x| x / scale);
-        }
-        let rate = |state: usize| (left[state] / (left[state] + stays[state]).max(1e-12)).clamp(LEAVES[0], LEAVES[1]);
-        self.leaves = [rate(1), rate(0)];
-        self.switches = left[0] + left[1];
-        self.log_likelihood = log_likelihood;
-    }
-
-    /// Square of the signal-to-noise ratio of what switches, its mean taken away.
-    fn energy(&self, axes: &[usize], binned: &[Binned; 3]) -> f64 {
-        let of_axis = |(k, [down, up]): (&usize, &[f64; 2])| {
-            let weight = |i: usize| 1.0 / binned[*k].variance_ng2[i];
-            let n = self.up.len();
-            let all: f64 = (0..n).map(weight).sum();
-            let mean = (0..n).map(|i| weight(i) * self.up[i]).sum::<f64>() / all;
-            (0..n).map(|i| weight(i) * (self.up[i] - mean).powi(2)).sum::<f64>() * (up - down).powi(2)
-        };
-        axes.iter().zip(&self.levels).map(of_axis).sum()
-    }
-}
-
-/// Levels down and up that make a series likeliest, `None` where it is only ever one of them.
-fn levels(series: &Binned, up: &[f64]) -> Option<[f64; 2]> {
-    let mut sums = [[0.0; 2]; 2];
-    for ((mean, variance), up) in series.mean_ng.iter().zip(&series.variance_ng2).zip(up) {
-        for (sum, share) in sums.iter_mut().zip([1.0 - up, *up]) {
-            sum[0] += share * mean / variance;
-            sum[1] += share / variance;
-        }
-    }
-    sums.iter().all(|s| s[1] > 0.0).then(|| sums.map(|[x, w]| x / w))
 }
 
 #[cfg(test)]
