@@ -11,7 +11,7 @@ use super::null_table;
 use super::report::{CovariatePlate, Plates};
 use super::scene::{Axes, Scene};
 use super::solve::{Library, Solution, null_noise};
-use super::verdict;
+use super::verdict::{self, Proof};
 use crate::math::shared_work;
 
 /// How to analyse.
@@ -102,8 +102,8 @@ impl<'a> Prepared<'a> {
             Some(r) if r.least <= self.settings.claim_probability || r.probability > 3.0 * r.least => r.probability,
             _ => table,
         };
-        let (diagnosis, model_ng, ladder) =
-            verdict::conclude(&self.scene, &self.library, &self.solution, decisive, self.settings.claim_probability);
+        let proof = Proof { probability: decisive, claim: self.settings.claim_probability, chances: 1.0 };
+        let (diagnosis, model_ng, ladder) = verdict::conclude(&self.scene, &self.library, &self.solution, proof);
         Analysis { plates: plates(&self.scene, model_ng, ladder), diagnosis }
     }
 }

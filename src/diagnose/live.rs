@@ -4,7 +4,8 @@
 //! the look before and searches the whole catalogue. A look is taken when enough windows are new, so the answer is a function of
 //! the windows so far and of where the looks fell, and at rest it is that of `oare diagnose` on the same windows, but for the
 //! level of proof: many looks are many chances, so an alarm needs posterior odds that no number of looks reaches by chance
-//! oftener than is allowed (Ville 1939: an evidence ratio of 1/p is met with probability p at most, however long one waits).
+//! oftener than is allowed (Ville 1939: an evidence ratio of 1/p is met with probability p at most, however long one waits), and
+//! what remains beside it is charged for the looks before.
 //!
 //! Not here: threads, clocks, who brings the windows and who is told.
 
@@ -17,11 +18,12 @@ use super::bursts::solve_beside_bursts;
 use super::case::{Case, Expectation, WINDOW_STRIDE_S, WINDOWS_MIN};
 use super::error::CaseError;
 use super::noise::AxisNoise;
+use super::null_table;
 use super::recorder::Usable;
 use super::report;
 use super::scene::{Scene, Surroundings};
 use super::solve::{Library, Stop, null_noise};
-use super::{null_table, verdict};
+use super::verdict::{self, Proof};
 use crate::math::shared_work;
 
 /// Looks kept for readers.
@@ -227,11 +229,15 @@ impl Live {
         let Some(solution) = solve_beside_bursts(&mut scene, &library, noise, stop) else { return false };
         self.noise = Some(solution.null.noise);
         let log_odds = solution.statistic();
-        let probability = anytime_probability(log_odds);
-        let (diagnosis, _, _) =
-            verdict::conclude(&scene, &library, &solution, probability, self.policy.claim_probability);
         let clock_s = scene.clock_s();
-        self.used = Some([clock_s[0], clock_s[clock_s.len() - 1]]);
+        let used @ [first_s, last_s] = [clock_s[0], clock_s[clock_s.len() - 1]];
+        let proof = Proof {
+            probability: anytime_probability(log_odds),
+            claim: self.policy.claim_probability,
+            chances: chances_so_far(last_s - first_s, self.policy.search_every_s),
+        };
+        let (diagnosis, _, _) = verdict::conclude(&scene, &library, &solution, proof);
+        self.used = Some(used);
         self.windows_searched = clock_s.len();
         self.seen = seen;
         self.state = State::Current;
@@ -344,6 +350,13 @@ fn anytime_probability(log_odds: f64) -> f64 {
     null_table::false_alarm_probability(log_odds, f64::INFINITY).max((-log_odds).exp()).min(1.0)
 }
 
+/// By what the probability of a single look at a record of this length counts more, so that all looks together, one after another as
+/// it grows, are chanced no oftener: the first may take 6/pi^2 of what is allowed, look number n its n^2th part.
+fn chances_so_far(length_s: f64, search_every_s: f64) -> f64 {
+    let look = 1.0 + (length_s / search_every_s).floor();
+    std::f64::consts::PI.powi(2) / 6.0 * look * look
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -375,6 +388,12 @@ mod tests {
             Milestones { searches: 7, alarm_clock_s: Some(1.5), name: named(&["vent_leak"]), ..Milestones::default() };
         let json = serde_json::to_value(&m).unwrap();
         assert_eq!(serde_json::from_value::<Milestones>(json).unwrap(), m);
+    }
+
+    #[test]
+    fn what_remains_may_be_chanced_at_any_of_many_looks_no_oftener_than_once() {
+        let spent: f64 = (0..100_000).map(|n| chances_so_far(3600.0 * f64::from(n) + 1.0, 3600.0).recip()).sum();
+        assert!(spent <= 1.0 && spent > 0.99, "{spent}");
     }
 
     #[test]

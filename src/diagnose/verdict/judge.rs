@@ -1,8 +1,8 @@
 //! What the evidence and the trial say, before what remains is asked.
 
-use super::EVIDENCE_SHARE;
 use super::credible::simplest;
 use super::stands::{fails, tried};
+use super::{EVIDENCE_SHARE, Proof};
 use crate::diagnose::answer::Verdict;
 use crate::diagnose::scene::Scene;
 use crate::diagnose::search::Weighed;
@@ -34,8 +34,7 @@ pub fn judge<'a>(
     library: &Library,
     solution: &'a Solution,
     listed: &[&'a Weighed],
-    probability: f64,
-    claim: f64,
+    Proof { probability, claim, .. }: Proof,
 ) -> Judged<'a> {
     let height = |w: Option<&Weighed>| w.map_or(f64::NEG_INFINITY, |w| w.log_posterior);
     let null = solution.null.log_posterior;

@@ -35,6 +35,17 @@ const EVIDENCE_SHARE: f64 = 0.8;
 /// What remains overturns an explanation when it has more than this share of the energy explained.
 const REMAINS_SHARE: f64 = 0.03;
 
+/// What proof there is, and what is asked for.
+#[derive(Debug, Clone, Copy)]
+pub struct Proof {
+    /// Probability that noise reaches the evidence of this record.
+    pub probability: f64,
+    /// Probability of a false alarm at or below which something is claimed.
+    pub claim: f64,
+    /// Chances that noise has to leave as much as remains here: one, or what all looks at a record that grows amount to.
+    pub chances: f64,
+}
+
 /// What the answer rests on.
 struct Best<'a> {
     weighed: &'a Weighed,
@@ -67,19 +78,18 @@ pub fn conclude(
     scene: &Scene,
     library: &Library,
     solution: &Solution,
-    probability: f64,
-    claim: f64,
+    proof: Proof,
 ) -> (Diagnosis, Axes, Vec<(String, f64)>) {
     let mut notes = of_windows(scene);
     let listed = credible(scene, library, &solution.listed, &mut notes);
-    let judged = judge(scene, library, solution, &listed, probability, claim);
+    let judged = judge(scene, library, solution, &listed, proof);
     let Judged { open_wins, refused, failure, .. } = judged;
     notes.extend(failure.clone());
     let chosen = judged.on_trial.as_ref().map(|(weighed, _)| *weighed);
-    let (verdict, remains) = with_remains(scene, library, solution, (judged.verdict, chosen), claim);
+    let (verdict, remains) = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
     let tried = judged.on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
     let least = remains.as_ref().map_or(1.0, |r| r.probability);
-    let overall = (probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
+    let overall = (proof.probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
     let statistic = Some(solution.statistic());
     let slow_evidence = Some(solution.null.slow_evidence);
     let mut answer =
@@ -162,15 +172,16 @@ fn with_remains(
     library: &Library,
     solution: &Solution,
     (verdict, chosen): (Verdict, Option<&Weighed>),
-    claim: f64,
+    proof: Proof,
 ) -> (Verdict, Option<Remains>) {
     let weighed = chosen.unwrap_or(&solution.null);
     let left = weighed.left(scene, &library.entries);
-    let remains = remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness);
+    let remains = remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness)
+        .map(|r| Remains { probability: (proof.chances * r.probability).min(1.0), ..r });
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
     let overturns = remains
         .as_ref()
-        .is_some_and(|r| r.probability <= (1.0 - EVIDENCE_SHARE) * claim && r.energy > REMAINS_SHARE * explained);
+        .is_some_and(|r| r.probability <= (1.0 - EVIDENCE_SHARE) * proof.claim && r.energy > REMAINS_SHARE * explained);
     match verdict {
         Verdict::Consistent | Verdict::Explained if overturns => (Verdict::Unexplained, remains),
         Verdict::Explained => (verdict, None),
