@@ -152,8 +152,8 @@ fn standard_vector(axes: &Axes) -> Option<Axes> {
         .then(|| std::array::from_fn(|k| axes[k].iter().map(|x| (x - mean[k]) / deviation).collect()))
 }
 
-/// Those who fill the dictionary.
-const COLLECTED: [fn(&mut Collector); 10] = [
+/// Who fills the dictionary, in the order in which its forms stand.
+const COLLECTORS: [fn(&mut Collector); 10] = [
     motion::rates,
     motion::orbit,
     surroundings::sunlight,
@@ -173,7 +173,7 @@ pub fn dictionary(scene: &Scene) -> Vec<Atom> {
         collect(&mut c);
         c.atoms
     };
-    shared_work::map(&COLLECTED, collected).into_iter().flatten().collect()
+    shared_work::map(&COLLECTORS, collected).into_iter().flatten().collect()
 }
 
 const AXIS: [&str; 3] = ["x", "y", "z"];
