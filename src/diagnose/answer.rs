@@ -191,7 +191,7 @@ pub struct Alternative {
     pub effects: Vec<String>,
     /// Its probability.
     pub posterior: f64,
-    /// Twice the log evidence it lacks against the reported set.
+    /// Twice the log evidence it lacks against the reported set, or against nothing where none is reported; negative where it has more.
     pub delta_bic: f64,
 }
 

@@ -158,6 +158,23 @@ impl Frame {
         Self { whiteners, nuisance, log_det, data: Column::default(), log_null: log_det }.with_data(residual_ng)
     }
 
+    /// A residual less the likeliest of the errors that all windows share.
+    pub fn less_shared_errors(&self, residual_ng: &Axes, shared_ng: &[Vec<Vec<f64>>; 3]) -> Axes {
+        std::array::from_fn(|k| {
+            let mut left = residual_ng[k].clone();
+            let beside = |series: &Vec<f64>| beside_one(&self.whiteners[k], &self.nuisance[k][0], series);
+            let (data, columns) = (beside(&left), shared_ng[k].iter().map(beside).collect::<Vec<_>>());
+            let m = columns.len();
+            let normal = DMatrix::from_fn(m, m, |i, j| dot(&columns[i], &columns[j])) + DMatrix::identity(m, m);
+            let right = DVector::from_fn(m, |i, _| dot(&columns[i], &data));
+            let Some(normal) = Cholesky::new(normal).filter(|_| m > 0) else { return left };
+            for (size, series) in normal.solve(&right).iter().zip(&shared_ng[k]) {
+                left.iter_mut().zip(series).for_each(|(x, error)| *x -= size * error);
+            }
+            left
+        })
+    }
+
     fn windows(&self) -> usize {
         self.nuisance[0][0].len()
     }
@@ -227,16 +244,18 @@ impl Frame {
     }
 }
 
+/// A series whitened, and made orthogonal to the whitened constant, which is of unit norm.
+fn beside_one(whitener: &Whitener, one: &[f64], series: &[f64]) -> Vec<f64> {
+    let mut whitened = whitener.whiten(series);
+    let constant = dot(&whitened, one);
+    whitened.iter_mut().zip(one).for_each(|(x, one)| *x -= constant * one);
+    whitened
+}
+
 /// Whitened errors that all windows share, made orthogonal to the constant and to each other, each by the root of the share of it
 /// that the data decide; and what they take from the log likelihood.
 fn shared_errors(whitener: &Whitener, one: &[f64], shared_ng: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
-    let beside_one = |series: &Vec<f64>| {
-        let mut whitened = whitener.whiten(series);
-        let constant = dot(&whitened, one);
-        whitened.iter_mut().zip(one).for_each(|(x, one)| *x -= constant * one);
-        whitened
-    };
-    let whitened: Vec<Vec<f64>> = shared_ng.iter().map(beside_one).collect();
+    let whitened: Vec<Vec<f64>> = shared_ng.iter().map(|series| beside_one(whitener, one, series)).collect();
     let m = whitened.len();
     if m == 0 {
         return (Vec::new(), 0.0);
@@ -460,5 +479,10 @@ mod tests {
         let log_ratio = known.log_null - alone.log_null;
         let expected = 0.5 * 4.0 * energy - 0.5 * 4.0 * energy / (1.0 + energy) - 0.5 * (1.0 + energy).ln();
         assert!((log_ratio - expected).abs() < 1e-6 * expected.abs(), "{log_ratio} {expected}");
+        // Taken from the residual it leaves the share that the prior holds back, and a constant.
+        let [x, left, _] = known.less_shared_errors(&residual, &[Vec::new(), vec![drift.clone()], Vec::new()]);
+        let kept = 2.0 / (1.0 + energy);
+        assert!(x == residual[0]);
+        assert!(left.iter().zip(&drift).all(|(left, drift)| (left - kept * drift).abs() < 1e-6 * 40.0));
     }
 }

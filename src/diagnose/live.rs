@@ -230,14 +230,13 @@ impl Live {
         self.noise = Some(solution.null.noise);
         let log_odds = solution.statistic();
         let clock_s = scene.clock_s();
-        let used @ [first_s, last_s] = [clock_s[0], clock_s[clock_s.len() - 1]];
         let proof = Proof {
             probability: anytime_probability(log_odds),
             claim: self.policy.claim_probability,
-            chances: chances_so_far(last_s - first_s, self.policy.search_every_s),
+            chances: chances_at(self.milestones.searches + 1),
         };
         let (diagnosis, _, _) = verdict::conclude(&scene, &library, &solution, proof);
-        self.used = Some(used);
+        self.used = Some([clock_s[0], clock_s[clock_s.len() - 1]]);
         self.windows_searched = clock_s.len();
         self.seen = seen;
         self.state = State::Current;
@@ -350,11 +349,10 @@ fn anytime_probability(log_odds: f64) -> f64 {
     null_table::false_alarm_probability(log_odds, f64::INFINITY).max((-log_odds).exp()).min(1.0)
 }
 
-/// By what the probability of a single look at a record of this length counts more, so that all looks together, one after another as
-/// it grows, are chanced no oftener: the first may take 6/pi^2 of what is allowed, look number n its n^2th part.
-fn chances_so_far(length_s: f64, search_every_s: f64) -> f64 {
-    let look = 1.0 + (length_s / search_every_s).floor();
-    std::f64::consts::PI.powi(2) / 6.0 * look * look
+/// By what the probability of a single look counts more at look number `look`, from 1, so that all looks together are chanced no
+/// oftener: the first may take 6/pi^2 of what is allowed, number n the n^2th part of that.
+fn chances_at(look: u64) -> f64 {
+    std::f64::consts::PI.powi(2) / 6.0 * (look as f64).powi(2)
 }
 
 #[cfg(test)]
@@ -392,7 +390,7 @@ mod tests {
 
     #[test]
     fn what_remains_may_be_chanced_at_any_of_many_looks_no_oftener_than_once() {
-        let spent: f64 = (0..100_000).map(|n| chances_so_far(3600.0 * f64::from(n) + 1.0, 3600.0).recip()).sum();
+        let spent: f64 = (1..100_000).map(|look| chances_at(look).recip()).sum();
         assert!(spent <= 1.0 && spent > 0.99, "{spent}");
     }
 

@@ -211,7 +211,7 @@ mod tests {
 
     #[test]
     fn a_silent_answer_is_right_on_a_clean_case_and_wrong_on_a_loud_one() {
-        let silent = r#"{"verdict":"consistent","effects":[]}"#;
+        let silent = r#"{"verdict":"consistent","effects":[],"alternatives":[{"effects":["aerodynamic_drag"],"posterior":0.6}]}"#;
         let score =
             score(&[outcome("clean", None, 0.0, silent), outcome("one", Some("aerodynamic_drag"), 30.0, silent)]);
         assert_eq!(value(&score, "false alarm, clean"), (0, 1));

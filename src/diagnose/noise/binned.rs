@@ -1,8 +1,9 @@
 //! A residual in bins that are long beside the quick noise: the mean of each, and the variance that the quick noise gives it.
 
+use super::marginal::{SLOW_AMPLITUDES_NG, SLOW_TIMES_S};
 use super::{AxisNoise, Loudness, Schedule};
 
-/// Length of a bin, s: several correlation times of the short part.
+/// Length of a bin, s: several correlation times of the short part as it mostly is.
 pub const BIN_S: f64 = 400.0;
 /// Fewest windows of a bin.
 const WINDOWS_MIN: usize = 4;
@@ -39,8 +40,15 @@ impl Binned {
         binned
     }
 
-    /// Log likelihood of white and short noise beside slow noise, a constant fitted.
-    pub fn log_likelihood_of_slow_noise(&self, slow_ng: f64, slow_tau_s: f64) -> f64 {
+    /// The best log likelihood of slow noise beside white and short noise: of that fitted, and of all that is weighed against it.
+    pub fn likeliest_slow_noise(&self, fitted: &AxisNoise) -> f64 {
+        let of = |slow_ng: &f64| SLOW_TIMES_S.map(|tau_s| self.log_likelihood_of_slow_noise(*slow_ng, tau_s));
+        let at_fit = self.log_likelihood_of_slow_noise(fitted.slow_ng, fitted.slow_tau_s);
+        SLOW_AMPLITUDES_NG.iter().flat_map(of).fold(at_fit, f64::max)
+    }
+
+    /// Log likelihood, but for its constant, of white and short noise beside slow noise; the mean is fitted.
+    fn log_likelihood_of_slow_noise(&self, slow_ng: f64, slow_tau_s: f64) -> f64 {
         let keep = (-BIN_S / slow_tau_s).exp();
         let variance = slow_ng * slow_ng;
         let (mut state, mut p) = ([0.0; 2], variance);

@@ -14,15 +14,15 @@ pub(super) struct Chain {
     pub levels: Vec<[f64; 2]>,
     /// Probability per bin to leave down, and to leave up.
     pub leaves: [f64; 2],
-    /// Log likelihood at these.
+    /// Log likelihood, but for its constant, at the levels and at the rates before they were fitted a last time.
     pub log_likelihood: f64,
-    /// Switches to be expected.
-    pub switches: f64,
+    /// Switches between bins that were seen.
+    pub switches: usize,
 }
 
 impl Chain {
     /// Up where the smoothed series is above its mean.
-    pub fn begin(series: &Binned, smooth: usize) -> Option<Vec<f64>> {
+    pub fn first_guess(series: &Binned, smooth: usize) -> Option<Vec<f64>> {
         let weight: Vec<f64> = series.variance_ng2.iter().map(|v| 1.0 / v).collect();
         let mean_of = |range: std::ops::Range<usize>| {
             let (sum, all) = range.fold((0.0, 0.0), |(s, w), i| (s + weight[i] * series.mean_ng[i], w + weight[i]));
@@ -41,11 +41,14 @@ impl Chain {
 
     /// Levels and rates, by expectation and maximisation from a first guess of when it is up.
     pub fn fitted(series: &[&Binned], up: Vec<f64>, rounds: usize) -> Option<Self> {
-        let mut chain = Self { up, levels: Vec::new(), leaves: [0.1; 2], log_likelihood: 0.0, switches: 0.0 };
+        let mut chain = Self { up, levels: Vec::new(), leaves: [0.1; 2], log_likelihood: 0.0, switches: 0 };
         for _ in 0..rounds {
             chain.levels = series.iter().map(|s| levels(s, &chain.up)).collect::<Option<Vec<[f64; 2]>>>()?;
             chain.expect(series);
         }
+        let seen = (0..chain.up.len()).filter(|i| series.iter().any(|s| s.variance_ng2[*i].is_finite()));
+        let states: Vec<bool> = seen.map(|i| chain.up[i] > 0.5).collect();
+        chain.switches = states.windows(2).filter(|w| w[0] != w[1]).count();
         chain.log_likelihood.is_finite().then_some(chain)
     }
 
@@ -75,20 +78,7 @@ impl Chain {
         self.leaves = std::array::from_fn(|state| {
             (left[state] / (left[state] + stayed[state]).max(f64::MIN_POSITIVE)).clamp(LEAVES[0], LEAVES[1])
         });
-        self.switches = left[0] + left[1];
         self.log_likelihood = seen.log_likelihood;
-    }
-
-    /// Square of the signal-to-noise ratio of what switches, its mean taken away.
-    pub fn energy(&self, axes: &[usize], binned: &[Binned; 3]) -> f64 {
-        let of_axis = |(k, [down, up]): (&usize, &[f64; 2])| {
-            let weight = |i: usize| 1.0 / binned[*k].variance_ng2[i];
-            let n = self.up.len();
-            let all: f64 = (0..n).map(weight).sum();
-            let mean = (0..n).map(|i| weight(i) * self.up[i]).sum::<f64>() / all;
-            (0..n).map(|i| weight(i) * (self.up[i] - mean).powi(2)).sum::<f64>() * (up - down).powi(2)
-        };
-        axes.iter().zip(&self.levels).map(of_axis).sum()
     }
 }
 
@@ -186,7 +176,8 @@ mod tests {
     fn each_round_makes_it_likelier() {
         let mean_ng: Vec<f64> = (0..60).map(|i| if (i / 7) % 2 == 0 { 2.0 } else { 9.0 } + f64::from(i % 3)).collect();
         let series = Binned { variance_ng2: vec![4.0; mean_ng.len()], mean_ng };
-        let of = |rounds| Chain::fitted(&[&series], Chain::begin(&series, 1).unwrap(), rounds).unwrap().log_likelihood;
+        let of =
+            |rounds| Chain::fitted(&[&series], Chain::first_guess(&series, 1).unwrap(), rounds).unwrap().log_likelihood;
         let rounds: Vec<f64> = (1..12).map(of).collect();
         // But for the first bin: where a chain begins follows from its rates and is no part of their fit.
         assert!(rounds.windows(2).all(|w| w[1] > w[0] - 1e-3) && rounds[10] > rounds[0] + 0.1, "{rounds:?}");

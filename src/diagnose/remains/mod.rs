@@ -21,9 +21,9 @@ const QUESTIONS: f64 = 3.0;
 /// Structure that remains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remains {
-    /// Probability that white, independent residuals show as much, all questions counted.
+    /// Probability that noise leaves as much, all questions counted.
     pub probability: f64,
-    /// Its whitened energy: the square of its signal-to-noise ratio, about.
+    /// Its whitened energy, or twice its log evidence: about the square of its signal-to-noise ratio.
     pub energy: f64,
     /// In words: its form.
     pub form: String,
@@ -42,19 +42,15 @@ pub fn strongest(
     schedule: &Schedule,
     loudness: &[Loudness; 3],
 ) -> Option<Remains> {
-    let grid = Grid::new(&schedule.clock_s, &left.whitened);
+    // Too few windows have no bands, too few bins no levels; too many are of another kind of record.
+    let grid = Grid::new(&schedule.clock_s, &left.whitened)?;
     let scale_ng = noise.map(|n| n.rms_ng());
-    let binned: [Binned; 3] =
-        std::array::from_fn(|k| Binned::new(&left.residual_ng[k], &noise[k], schedule, &loudness[k]));
-    [
-        grid.as_ref().and_then(|grid| together::together(grid, scale_ng)),
-        grid.as_ref().and_then(|grid| line::line(grid, scale_ng)),
-        switching::switching(&binned),
-    ]
-    .into_iter()
-    .flatten()
-    .min_by(|a, b| a.probability.total_cmp(&b.probability))
-    .map(|r| Remains { probability: (QUESTIONS * r.probability).min(1.0), ..r })
+    let binned = std::array::from_fn(|k| Binned::new(&left.residual_ng[k], &noise[k], schedule, &loudness[k]));
+    [together::together(&grid, scale_ng), line::line(&grid, scale_ng), switching::switching(&binned, noise)]
+        .into_iter()
+        .flatten()
+        .min_by(|a, b| a.probability.total_cmp(&b.probability))
+        .map(|r| Remains { probability: (QUESTIONS * r.probability).min(1.0), ..r })
 }
 
 /// Axes that carry at least a twentieth of the energy.

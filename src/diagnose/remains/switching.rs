@@ -2,19 +2,16 @@
 //!
 //! A push that goes on and off at instants of no log (a valve that sticks, an instrument of two states) has the spectrum of slow
 //! noise; what tells them apart is that the levels are two. A hidden Markov chain of two states against slow noise at its best, both on
-//! bins of the residual. The ratio of a likelihood that is charged for its free numbers (Schwarz 1978) to the best likelihood of noise
-//! exceeds x in at most one record of noise in x (Wasserman et al. 2020).
+//! bins of the residual. A likelihood charged for its free numbers (Schwarz 1978) is about that of a mixture, and the ratio of a mixture
+//! to the best likelihood of noise exceeds x in at most one record of noise in x (Wasserman et al. 2020).
 
 use super::chain::Chain;
 use super::{Remains, sharing};
-use crate::diagnose::noise::{BIN_S, Binned};
+use crate::diagnose::noise::{AxisNoise, BIN_S, Binned};
 use crate::math::shared_work;
 
 /// Fewest switches: one or two are a step or a push, and the catalogue has those.
-const SWITCHES_MIN: f64 = 4.0;
-/// Slow noise compared with: amplitudes, ng, and correlation times, s.
-const SLOW_NG: [f64; 12] = [0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0];
-const SLOW_TAU_S: [f64; 6] = [300.0, 700.0, 1500.0, 3000.0, 6500.0, 14_000.0];
+const SWITCHES_MIN: usize = 4;
 /// Rounds of the fit: of the axis that begins, and of the axes it is carried on to.
 const ROUNDS: [usize; 2] = [25, 10];
 /// Log evidence of the axis that begins above which it is carried on to others.
@@ -29,12 +26,12 @@ const AXES: [&[usize]; 7] = [&[0], &[1], &[2], &[0, 1], &[0, 2], &[1, 2], &[0, 1
 type Switching = (f64, &'static [usize], Chain);
 
 /// Whether it switches.
-pub(super) fn switching(binned: &[Binned; 3]) -> Option<Remains> {
+pub(super) fn switching(binned: &[Binned; 3], noise: &[AxisNoise; 3]) -> Option<Remains> {
     let bins = (0..binned[0].mean_ng.len()).filter(|i| binned.iter().all(|b| b.variance_ng2[*i].is_finite())).count();
     if bins < 30 {
         return None;
     }
-    let wanders: [f64; 3] = std::array::from_fn(|k| likeliest_slow_noise(&binned[k]));
+    let wanders: [f64; 3] = std::array::from_fn(|k| binned[k].likeliest_slow_noise(&noise[k]));
     // What a chain of so many axes says above slow noise, charged for its free numbers.
     let above = |chain: &Chain, axes: &[usize]| {
         let noise: f64 = axes.iter().map(|k| wanders[*k]).sum();
@@ -42,7 +39,7 @@ pub(super) fn switching(binned: &[Binned; 3]) -> Option<Remains> {
     };
     let begins: Vec<(usize, usize)> = (0..3).flat_map(|axis| SMOOTH.map(|smooth| (axis, smooth))).collect();
     let from = |(begin, smooth): &(usize, usize)| -> Option<Switching> {
-        let alone = Chain::fitted(&[&binned[*begin]], Chain::begin(&binned[*begin], *smooth)?, ROUNDS[0])?;
+        let alone = Chain::fitted(&[&binned[*begin]], Chain::first_guess(&binned[*begin], *smooth)?, ROUNDS[0])?;
         if above(&alone, &[*begin]) < WORTH_MORE_AXES {
             return None;
         }
@@ -54,33 +51,27 @@ pub(super) fn switching(binned: &[Binned; 3]) -> Option<Remains> {
         carried.max_by(|a, b| a.0.total_cmp(&b.0))
     };
     let found = shared_work::map(&begins, from).into_iter().flatten();
-    let (above, axes, chain) = found.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
+    let (evidence, axes, chain) = found.reduce(|best, next| if next.0 > best.0 { next } else { best })?;
     let mut push_ng = [0.0; 3];
     axes.iter().zip(&chain.levels).for_each(|(k, [down, up])| push_ng[*k] = up - down);
     let [off_s, on_s] = chain.leaves.map(|p| BIN_S / p);
     Some(Remains {
-        probability: (AXES.len() as f64 * (-above).exp()).min(1.0),
-        energy: chain.energy(axes, binned),
+        probability: (AXES.len() as f64 * (-evidence).exp()).min(1.0),
+        energy: 2.0 * evidence,
         form: "s(t) d, d fixed in the body, s(t) now 0 and now 1".into(),
         axis: format!("d = [{:.1}, {:.1}, {:.1}] ng", push_ng[0], push_ng[1], push_ng[2]),
         axes: sharing(push_ng),
         location: format!(
-            "two levels, about {:.0} switches at instants of no log; {on_s:.0} s of one and {off_s:.0} s of the other on the average",
+            "two levels, {} switches; on the average {on_s:.0} s at s = 1 and {off_s:.0} s at s = 0",
             chain.switches
         ),
     })
 }
 
-/// The best log likelihood of slow noise.
-fn likeliest_slow_noise(binned: &Binned) -> f64 {
-    let of = |slow_ng: &f64| SLOW_TAU_S.map(|tau_s| binned.log_likelihood_of_slow_noise(*slow_ng, tau_s));
-    SLOW_NG.iter().flat_map(of).fold(f64::NEG_INFINITY, f64::max)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::noise::{AxisNoise, Loudness, Schedule, simulate};
+    use crate::diagnose::noise::{Loudness, Schedule, simulate};
     use rand::{RngExt, SeedableRng};
     use rand_distr::{Distribution, StandardNormal};
 
@@ -118,13 +109,13 @@ mod tests {
 
     #[test]
     fn a_push_that_switches_is_found_with_its_size_and_slow_noise_is_none() {
-        let found = switching(&record(1, 0.0, 80.0)).unwrap();
+        let found = switching(&record(1, 0.0, 80.0), &[NOISE; 3]).unwrap();
         assert!(found.probability < 1e-6 && found.axes == ["y"], "{found:?}");
         let size: f64 = found.axis.split(", ").nth(1).and_then(|x| x.parse().ok()).unwrap();
         assert!((size.abs() - 80.0).abs() < 8.0, "{found:?}");
         // Forty records of slow noise: a probability below a thousandth has one chance in twenty-five among them.
         for seed in 0..40 {
-            let probability = switching(&record(seed, 15.0, 0.0)).map_or(1.0, |r| r.probability);
+            let probability = switching(&record(seed, 15.0, 0.0), &[NOISE; 3]).map_or(1.0, |r| r.probability);
             assert!(probability > 1e-3, "{seed}: {probability}");
         }
     }

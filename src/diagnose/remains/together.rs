@@ -8,7 +8,7 @@ use super::{Remains, sharing};
 
 /// Shortest period at which the axes are compared, s: what is faster is the crew's.
 const TOGETHER_S: f64 = 400.0;
-/// Lines of the spectrum in the narrowest band in which the axes are compared: fewer numbers than that correlate by chance.
+/// Lines of the spectrum in the narrowest band in which the axes are compared: narrower bands are more questions, and answer few.
 const LINES_MIN: usize = 4;
 
 /// Probability that the correlation matrix of three independent series has a determinant of `x` or less, from so many numbers each.

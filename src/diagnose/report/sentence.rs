@@ -18,11 +18,15 @@ fn consistent(d: &Diagnosis) -> String {
     let limit = loosest.map_or(String::new(), |l| {
         format!(" The least well bounded effect, {}, stays below {} ng rms (95 %).", words(&l.id), short(l.limit_ng))
     });
-    let nearest = d.alternatives.first().map_or(String::new(), |a| {
-        let set = a.effects.iter().map(|id| words(id)).collect::<Vec<_>>().join(" with ");
-        format!(" What comes nearest is {set}, of a posterior of {}; it is not claimed.", short(a.posterior))
-    });
-    format!("The recording agrees with the simulation within its noise: there is nothing to correct.{nearest}{limit}")
+    let nothing = match d.alternatives.first() {
+        Some(a) => {
+            let set = a.effects.iter().map(|id| words(id)).collect::<Vec<_>>().join(" with ");
+            let posterior = short(a.posterior);
+            format!("nothing is claimed. What comes nearest, and lacks the proof, is {set} (posterior {posterior}).")
+        }
+        None => "there is nothing to correct.".into(),
+    };
+    format!("The recording agrees with the simulation within its noise: {nothing}{limit}")
 }
 
 fn explained(d: &Diagnosis) -> String {

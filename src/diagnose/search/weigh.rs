@@ -20,7 +20,7 @@ pub struct Weighed {
 
 /// What a set leaves at the windows.
 pub struct Left {
-    /// In ng.
+    /// In ng, less the likeliest of the errors that all windows share.
     pub residual_ng: Axes,
     /// Whitened, and what is nuisance removed.
     pub whitened: Axes,
@@ -45,7 +45,10 @@ impl Weighed {
         let (frame, set) = self.framed(scene, entries);
         let residual_ng = residual(scene, &frame, entries, &set);
         let after = frame.with_data(&residual_ng);
-        Left { whitened: std::array::from_fn(|k| after.data.projected(k, &after)), residual_ng }
+        Left {
+            residual_ng: frame.less_shared_errors(&residual_ng, &scene.schedule.shared_ng),
+            whitened: std::array::from_fn(|k| after.data.projected(k, &after)),
+        }
     }
 }
 

@@ -42,7 +42,7 @@ pub struct Proof {
     pub probability: f64,
     /// Probability of a false alarm at or below which something is claimed.
     pub claim: f64,
-    /// Chances that noise has to leave as much as remains here: one, or what all looks at a record that grows amount to.
+    /// What the probability of what remains is multiplied by: 1 for a single look, more where there were looks before.
     pub chances: f64,
 }
 
