@@ -3,7 +3,7 @@
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 
-use crate::diagnose::case::WINDOW_STRIDE_S;
+use crate::diagnose::case::{WINDOW_STRIDE_S, WINDOWS_MIN};
 use crate::diagnose::scene::Axes;
 
 /// The residuals on an even grid, zero where there is no window.
@@ -26,7 +26,7 @@ impl Grid {
         let record = place(&last) as f64;
         let length = (place(&last) + 1).next_power_of_two();
         // A record of a few minutes has no bands; one of years is not of this kind.
-        if clock_s.len() < 200 || length > 1 << 20 {
+        if clock_s.len() < WINDOWS_MIN || length > 1 << 20 {
             return None;
         }
         let mut variance = [0.0; 3];

@@ -15,9 +15,6 @@ use self::grid::Grid;
 use super::noise::{AxisNoise, Binned, Loudness, Schedule};
 use super::search::Left;
 
-/// Questions asked.
-const QUESTIONS: f64 = 3.0;
-
 /// Structure that remains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Remains {
@@ -46,11 +43,14 @@ pub fn strongest(
     let grid = Grid::new(&schedule.clock_s, &left.whitened)?;
     let scale_ng = noise.map(|n| n.rms_ng());
     let binned = std::array::from_fn(|k| Binned::new(&left.residual_ng[k], &noise[k], schedule, &loudness[k]));
-    [together::together(&grid, scale_ng), line::line(&grid, scale_ng), switching::switching(&binned, noise)]
+    let asked =
+        [together::together(&grid, scale_ng), line::line(&grid, scale_ng), switching::switching(&binned, noise)];
+    let questions = asked.len() as f64;
+    asked
         .into_iter()
         .flatten()
         .min_by(|a, b| a.probability.total_cmp(&b.probability))
-        .map(|r| Remains { probability: (QUESTIONS * r.probability).min(1.0), ..r })
+        .map(|r| Remains { probability: (questions * r.probability).min(1.0), ..r })
 }
 
 /// Axes that carry at least a twentieth of the energy.

@@ -14,7 +14,10 @@ use crate::math::shared_work;
 const SWITCHES_MIN: usize = 4;
 /// Rounds of the fit: of the axis that begins, and of the axes it is carried on to.
 const ROUNDS: [usize; 2] = [25, 10];
-/// Log evidence of the axis that begins above which it is carried on to others.
+/// Fewest bins, a little over three hours: fewer have no room for the fewest switches.
+const BINS_MIN: usize = 30;
+/// Log evidence of the axis that begins above which it is carried on to others: two further axes that say as much as it does make up
+/// for what it is charged.
 const WORTH_MORE_AXES: f64 = -10.0;
 /// Bins over which a residual is smoothed to begin with.
 const SMOOTH: [usize; 2] = [1, 4];
@@ -28,7 +31,7 @@ type Switching = (f64, &'static [usize], Chain);
 /// Whether it switches.
 pub(super) fn switching(binned: &[Binned; 3], noise: &[AxisNoise; 3]) -> Option<Remains> {
     let bins = (0..binned[0].mean_ng.len()).filter(|i| binned.iter().all(|b| b.variance_ng2[*i].is_finite())).count();
-    if bins < 30 {
+    if bins < BINS_MIN {
         return None;
     }
     let wanders: [f64; 3] = std::array::from_fn(|k| binned[k].likeliest_slow_noise(&noise[k]));

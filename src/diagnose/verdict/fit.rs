@@ -23,7 +23,7 @@ pub fn fit(
 ) -> (Fit, f64) {
     let entries = &library.entries;
     let left = search::residual(scene, frame, entries, set);
-    let after = Frame::new(&weighed.noise, &scene.schedule, &scene.loudness, &left);
+    let after = frame.with_data(&left);
     let dof = 3.0 * (scene.schedule.len() as f64 - 1.0);
     let level = |axes: &Axes, f: &Frame, used: f64| FitLevel {
         rms_ng: std::array::from_fn(|k| rms_about_mean(&axes[k])),
