@@ -59,7 +59,7 @@ fn machine() -> String {
 fn mission(hours: f64) -> Vec<u8> {
     let mission = Mission::new(MissionConfig::sts65(65, hours)).unwrap();
     let link = LinkConfig::default();
-    playbacks(&frames(&mission, link), &link, &RecorderConfig::clean(), 65)
+    playbacks(&frames(mission.fly(), link), &link, &RecorderConfig::clean(), 65)
         .into_iter()
         .flat_map(|pass| pass.octets)
         .collect()

@@ -1,10 +1,8 @@
-//! The project's own analyser as the one under test: it gets texts through the real reader, or a directory, and nothing else.
-
-use std::path::Path;
+//! The project's own analyser as the one under test: it gets files through the real reader, or a directory, and nothing else.
 
 use super::run::{Analyser, Material};
-use crate::diagnose::case::{Case, Header, Texts};
-use crate::diagnose::{Settings, analyse};
+use crate::diagnose::case::{Case, Header};
+use crate::diagnose::{Settings, analyse, recorder};
 
 /// The analyser with its settings.
 #[derive(Debug, Clone, Default)]
@@ -15,25 +13,24 @@ pub struct Engine {
     pub seed: u64,
 }
 
+/// The case in a material, through the real reader.
+///
+/// # Errors
+/// One sentence: what is missing or wrong.
+pub fn read(material: &Material) -> Result<Case, String> {
+    let file = |name: &str| match material {
+        Material::Files(files) => files.iter().find(|(n, _)| n == name).map(|(_, octets)| octets.clone()),
+        Material::Directory(path) => std::fs::read(path.join(name)).ok(),
+    };
+    let header = file("case.toml").and_then(|octets| String::from_utf8(octets).ok()).ok_or("there is no case.toml")?;
+    let header = Header::parse(&header, &[]).map_err(|e| e.to_string())?;
+    let texts = recorder::texts(&header, file).map_err(|e| e.to_string())?;
+    Case::from_texts(header, &texts).map_err(|e| e.to_string())
+}
+
 impl Analyser for Engine {
     fn answer(&self, material: &Material, deleted: Option<&str>) -> Result<serde_json::Value, String> {
-        let text = |name: &str| match material {
-            Material::Texts(files) => files.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone()),
-            Material::Directory(path) => read(path, name),
-        };
-        let header = text("case.toml").ok_or("there is no case.toml")?;
-        let header = Header::parse(&header, &[]).map_err(|e| e.to_string())?;
-        if header.kind != "acceleration_csv" {
-            return Err(format!("recording kind {} is not scored here", header.kind));
-        }
-        let files = header.files.clone();
-        let texts = Texts {
-            recording: text(&files.recording),
-            simulation: text(&files.simulation),
-            ancillary: text(&files.ancillary),
-            events: text(&files.events),
-        };
-        let case = Case::from_texts(header, &texts).map_err(|e| e.to_string())?;
+        let case = read(material)?;
         let settings = Settings {
             seed: self.seed,
             bootstraps: self.bootstraps,
@@ -43,11 +40,4 @@ impl Analyser for Engine {
         let analysis = analyse(&case, &settings).map_err(|e| e.to_string())?;
         serde_json::to_value(&analysis.diagnosis).map_err(|e| e.to_string())
     }
-}
-
-fn read(directory: &Path, name: &str) -> Option<String> {
-    if name.is_empty() {
-        return None;
-    }
-    std::fs::read_to_string(directory.join(name)).ok()
 }

@@ -18,8 +18,8 @@ use super::seal::Seal;
 
 /// What an analyser gets, and nothing else.
 pub enum Material<'a> {
-    /// Names and texts of the files.
-    Texts(&'a [(String, String)]),
+    /// Names and octets of the files.
+    Files(&'a [(String, Vec<u8>)]),
     /// A directory that holds them.
     Directory(&'a Path),
 }
@@ -84,7 +84,7 @@ pub fn run(
         .map(|(order, seal)| {
             let Concealed { files, truth, .. } = draw_order(order);
             let deleted = truth.deleted.clone();
-            let (answer, seconds) = timed(analyser, &Material::Texts(&files), deleted.as_deref());
+            let (answer, seconds) = timed(analyser, &Material::Files(&files), deleted.as_deref());
             seal.check(&truth)?;
             progress.inc(1);
             Ok(Outcome { truth, answer, seconds })
@@ -124,8 +124,8 @@ pub fn write(orders: &[Order], seals: &[Seal], directory: &Path, progress: &Prog
         let case = draw_order(order);
         let home = directory.join("cases").join(&case.id);
         std::fs::create_dir_all(&home)?;
-        for (name, text) in &case.files {
-            std::fs::write(home.join(name), text)?;
+        for (name, octets) in &case.files {
+            std::fs::write(home.join(name), octets)?;
         }
         let revealed = serde_json::json!({ "nonce": seal.nonce, "truth": case.truth });
         let text = serde_json::to_string_pretty(&revealed).map_err(io::Error::other)?;
@@ -155,8 +155,9 @@ mod tests {
 
     impl Analyser for Silent {
         fn answer(&self, material: &Material, _: Option<&str>) -> Result<serde_json::Value, String> {
-            let Material::Texts(files) = material else { return Err("texts were promised".into()) };
-            assert!(!files.iter().any(|(_, text)| text.contains("snr")), "the truth leaked");
+            let Material::Files(files) = material else { return Err("files were promised".into()) };
+            let leaks = |octets: &[u8]| octets.windows(3).any(|word| word == b"snr");
+            assert!(!files.iter().any(|(_, octets)| leaks(octets)), "the truth leaked");
             Ok(serde_json::json!({ "verdict": "consistent" }))
         }
     }

@@ -31,6 +31,9 @@ pub struct Args {
     /// One half window in a hundred is ten times as loud; the SNR does not know of it.
     #[arg(long)]
     bursts: bool,
+    /// Every recording is a dump of the payload recorder, from an instrument of its own; only accelerations are concealed in it.
+    #[arg(long)]
+    dump: bool,
     /// Draw from the real recordings below this folder instead of simulated ones.
     #[arg(long)]
     real: Option<PathBuf>,
@@ -94,7 +97,7 @@ fn concealed(args: &Args, engine: &Engine) -> anyhow::Result<Option<Vec<Outcome>
         (true, Some(id)) if effect::IDS.contains(&id) => vec![Kind::One],
         (true, Some(_)) => vec![Kind::Unknown],
     };
-    let manner = Manner { other_physics: args.other_physics, bursts: args.bursts };
+    let manner = Manner { other_physics: args.other_physics, bursts: args.bursts, dump: args.dump };
     let orders = run::plan(args.cases, args.seed, &kinds, manner, only);
     let progress = bar(orders.len(), "sealing");
     let seals = run::seal(&orders, &progress);

@@ -7,7 +7,7 @@ use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use oare_ground::diagnose::analysis::{Analysis, Prepared, Settings};
 use oare_ground::diagnose::answer::Diagnosis;
-use oare_ground::diagnose::case::{Case, Header, Texts};
+use oare_ground::diagnose::case::{Case, Header};
 use oare_ground::diagnose::error::CaseError;
 use oare_ground::diagnose::measured::{self, MeasuredCase};
 use oare_ground::diagnose::{recorder, report};
@@ -137,25 +137,12 @@ fn analyse(args: &Args) -> Result<Analysis, CaseError> {
 /// # Errors
 /// [`CaseError`] with one sentence that names the file and the value.
 pub fn read_case(directory: &Path, set: &[String]) -> Result<Case, CaseError> {
-    let text = |name: &str| std::fs::read_to_string(directory.join(name)).ok();
-    let toml = text("case.toml")
+    let file = |name: &str| std::fs::read(directory.join(name)).ok();
+    let toml = file("case.toml")
+        .and_then(|octets| String::from_utf8(octets).ok())
         .ok_or_else(|| CaseError::MissingFile { file: directory.join("case.toml").display().to_string() })?;
     let header = Header::parse(&toml, set)?;
-    let named = |name: &str| if name.is_empty() { None } else { text(name) };
-    let recording = match header.kind.as_str() {
-        "acceleration_csv" => named(&header.files.recording),
-        "recorder_dump" => {
-            let dump = std::fs::read(directory.join(&header.files.recording)).ok();
-            dump.map(|dump| recorder::recording_csv(&dump, &header))
-        }
-        _ => return Err(CaseError::Kind(header.kind)),
-    };
-    let texts = Texts {
-        recording,
-        simulation: named(&header.files.simulation),
-        ancillary: named(&header.files.ancillary),
-        events: named(&header.files.events),
-    };
+    let texts = recorder::texts(&header, file)?;
     Case::from_texts(header, &texts)
 }
 

@@ -1,5 +1,5 @@
-//! The bootstrap of the maximum statistic: records of the fitted noise alone, each through the whole search with the noise fitted
-//! anew.
+//! The bootstrap of the maximum statistic: records of nothing but the fitted noise and the errors that all windows share, each
+//! through the whole search with the noise fitted anew.
 //!
 //! Two things make it cheap. Most replicates are nowhere near what is asked about, and a first look at the noise they were made
 //! with tells: every entry alone, which needs no fit of the noise and no filter of its own. And where many reach what is asked
@@ -95,10 +95,15 @@ impl<'a> Bootstrap<'a> {
     fn noise_alone(&self, index: usize) -> Axes {
         let mut rng =
             rand_chacha::ChaCha8Rng::seed_from_u64(self.seed.wrapping_mul(1_000_003).wrapping_add(index as u64));
+        let schedule = &self.scene.schedule;
         std::array::from_fn(|k| {
-            noise::simulate(&self.noise[k], &self.scene.schedule, &self.scene.loudness[k], || {
-                StandardNormal.sample(&mut rng)
-            })
+            let mut normal = || StandardNormal.sample(&mut rng);
+            let mut noise = noise::simulate(&self.noise[k], schedule, &self.scene.loudness[k], &mut normal);
+            for error in &schedule.shared_ng[k] {
+                let size: f64 = normal();
+                noise.iter_mut().zip(error).for_each(|(x, error)| *x += size * error);
+            }
+            noise
         })
     }
 

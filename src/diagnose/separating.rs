@@ -385,6 +385,11 @@ fn to_come(scene: &Scene, action: Action, hours: f64) -> Option<(Case, Surroundi
         a.resize(a.len() + windows, 0.0);
         let usual = dev.last().copied().unwrap_or(1.0);
         dev.resize(dev.len() + windows, usual);
+        // What the calibration leaves open now it leaves open then.
+        for error in &mut recording.bias_errors_ng[k] {
+            let now = error.last().copied().unwrap_or(0.0);
+            error.resize(error.len() + windows, now);
+        }
     }
     Some((Case { expected: Arc::new(expected), recording, windows_too_rough: 0 }, surroundings))
 }

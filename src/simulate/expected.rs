@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use crate::physics::attitude::to_scalar_first;
 
 use super::SimulateError;
-use super::forces::ForceModel;
+use super::forces::{ForceModel, QuasiSteady};
 use super::instrument::Temperature;
 use super::mission::{Mission, MissionConfig};
 

@@ -1,49 +1,29 @@
 //! The mission flown, second by second: what the instrument feels, what it makes of it, what it sends.
 
-use rand::RngExt;
+mod sent;
+
+pub use sent::{Damage, Sent};
+
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::ingest::wire::Record;
 use crate::physics::Vec3;
-use crate::telemetry::{
-    AccRecord, Axis, Event, EventCode, Housekeeping, Mode, Range, SAMPLES_PER_RECORD, Step, TableReport,
-};
+use crate::telemetry::{AccRecord, Axis, Event, EventCode, Mode, Range, SAMPLES_PER_RECORD, Step};
 use crate::units::{Clock, NANO_G_M_S2};
 
 use super::autorange::Autorange;
 use super::calibration::{Schedule, ScheduledEvent, Segment};
 use super::faults::{Fault, SHUTDOWN_S};
+use super::forces::QuasiSteady;
 use super::instrument::Temperature;
-use super::mission::Mission;
+use super::mission::MissionConfig;
 use super::noise::Vibration;
 use super::onboard::OnBoard;
 use super::{Purpose, generator};
 
 /// A push that drives any axis to its rail in any range, ng.
 const RAIL_PUSH_NG: f64 = 4.0e7;
-/// What the electronics are warmer than the sensor, C.
-const ELECTRONICS_ABOVE_C: f64 = 3.3;
-/// Bus voltage, V, and its scatter.
-const BUS_V: (f64, f64) = (28.0, 0.03);
-
-/// What a record suffers before it is sent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Damage {
-    /// Its data are cut short.
-    CutShort,
-    /// Its BCD time is no time.
-    NoTime,
-}
-
-/// One record on its way down.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sent {
-    /// The record as it was meant.
-    pub record: Record,
-    /// What became of it.
-    pub damage: Option<Damage>,
-}
 
 /// A second of the mission.
 #[derive(Debug, Clone)]
@@ -64,7 +44,8 @@ pub struct Second {
 
 /// An iterator over the seconds of a mission.
 pub struct Flight<'a> {
-    mission: &'a Mission,
+    config: &'a MissionConfig,
+    forces: &'a dyn QuasiSteady,
     schedule: Schedule,
     events: Vec<ScheduledEvent>,
     next_event: usize,
@@ -100,13 +81,13 @@ struct Now {
 }
 
 impl<'a> Flight<'a> {
-    pub(crate) fn new(mission: &'a Mission) -> Self {
-        let config = &mission.config;
+    /// An instrument in whatever acts on it; of the plan, orbit, attitudes and forces are not asked.
+    pub fn new(config: &'a MissionConfig, forces: &'a dyn QuasiSteady) -> Self {
         let (start_s, end_s) = (config.start_clock_s, config.end_clock_s());
         let schedule = Schedule::new(&config.calibration, start_s, end_s, &config.faults);
         let misreport = misreport(&config.faults, &schedule);
         let mut events = schedule.events.clone();
-        events.extend(plan_events(mission));
+        events.extend(plan_events(config));
         events.sort_by_key(|event| event.0);
         let next_event = events.partition_point(|event| event.0 < start_s);
         let first = config.calibration.first_id.saturating_sub(1);
@@ -122,7 +103,8 @@ impl<'a> Flight<'a> {
             was_calibrating: false,
             clock_s: start_s,
             next_segment: 0,
-            mission,
+            config,
+            forces,
             schedule,
             events,
             next_event,
@@ -150,7 +132,7 @@ impl<'a> Flight<'a> {
     }
 
     fn shutdown_begun_s(&self) -> Option<u32> {
-        self.mission.config.faults.iter().find_map(|fault| match fault {
+        self.config.faults.iter().find_map(|fault| match fault {
             Fault::Shutdown { at_clock_s } if *at_clock_s <= self.clock_s => Some(*at_clock_s),
             _ => None,
         })
@@ -184,7 +166,7 @@ impl<'a> Flight<'a> {
         let (mut angle_rad, mut rate_rad_s) = (0.0, 0.0);
         for (i, sample) in counts.iter_mut().enumerate() {
             let clock_s = f64::from(now.clock_s) + i as f64 * 0.1;
-            let quasi_ng = self.mission.forces.quasi_steady_ng(clock_s);
+            let quasi_ng = self.forces.quasi_steady_ng(clock_s);
             mean_ng += quasi_ng;
             // a_body = (a_X, a_Z, -a_Y).
             let mut felt_ng = [quasi_ng.x, -quasi_ng.z, quasi_ng.y];
@@ -215,7 +197,7 @@ impl<'a> Flight<'a> {
             [x, y * cos + z * sin, -y * sin + z * cos]
         };
         let axis = segment.target_axis();
-        turned[axis] += self.mission.config.instrument.radius_m[axis] * rate_rad_s * rate_rad_s / NANO_G_M_S2;
+        turned[axis] += self.config.instrument.radius_m[axis] * rate_rad_s * rate_rad_s / NANO_G_M_S2;
         turned
     }
 
@@ -227,7 +209,7 @@ impl<'a> Flight<'a> {
         if !here {
             return 0.0;
         }
-        let share = self.mission.config.faults.iter().find_map(|fault| match fault {
+        let share = self.config.faults.iter().find_map(|fault| match fault {
             Fault::TableJitter { calibration_id, share }
                 if *calibration_id == 0 || *calibration_id == segment.calibration_id =>
             {
@@ -239,7 +221,7 @@ impl<'a> Flight<'a> {
     }
 
     fn push_to_rails(&self, clock_s: f64, now: &Now, felt_ng: &mut [f64; 3]) {
-        for fault in &self.mission.config.faults {
+        for fault in &self.config.faults {
             if let Fault::Saturation { axis, from_clock_s, seconds } = fault
                 && (*from_clock_s..from_clock_s + seconds).contains(&clock_s)
             {
@@ -259,7 +241,7 @@ impl<'a> Flight<'a> {
     /// Counts in the present ranges, quantised and held at the rails; the autoranger is told what was felt.
     fn counts(&mut self, now: &Now, clock_s: f64, felt_ng: &[f64; 3]) -> [i16; 3] {
         let rail = f64::from(AccRecord::RAIL_COUNTS);
-        let instrument = &self.mission.config.instrument;
+        let instrument = &self.config.instrument;
         std::array::from_fn(|axis| {
             let name = Axis::ALL[axis];
             let in_range =
@@ -273,7 +255,7 @@ impl<'a> Flight<'a> {
 
     /// What calibrations add to the counts: settling, the electronic shift, a disturbed calibration.
     fn extra_counts(&self, segment: &Segment, clock_s: f64, axis: usize) -> f64 {
-        let config = &self.mission.config;
+        let config = self.config;
         if segment.range != Range::C {
             return 0.0;
         }
@@ -307,7 +289,7 @@ impl<'a> Flight<'a> {
 
     /// The Orbiter's clock at this second, as the record states it, ms since 1970.
     fn orbiter_unix_ms(&mut self) -> i64 {
-        let config = &self.mission.config;
+        let config = self.config;
         let clock_s = f64::from(self.clock_s);
         let jumped_s: f64 = config
             .faults
@@ -356,7 +338,7 @@ impl Iterator for Flight<'_> {
         if self.clock_s >= self.end_s || shutdown.is_some_and(|begun_s| self.clock_s > begun_s + SHUTDOWN_S) {
             return None;
         }
-        let config = &self.mission.config;
+        let config = self.config;
         let (clock_s, met_h) = (self.clock_s, config.time.met_h(f64::from(self.clock_s)));
         let temperature_c = self.temperature.at(f64::from(clock_s), met_h);
         let segment = if shutdown.is_some() { None } else { self.segment() };
@@ -384,7 +366,7 @@ impl Iterator for Flight<'_> {
         }
         sent.extend(events.into_iter().map(|event| whole(Record::Evt(event))));
         if let Some(segment) = segment {
-            let report = table_report(&acc, &segment, angle_rad, rate_rad_s);
+            let report = sent::table_report(&acc, &segment, angle_rad, rate_rad_s);
             sent.push(Sent { damage: self.damage(Some(segment), false), record: Record::Tbl(report) });
         }
         if mode == Mode::Normal {
@@ -404,86 +386,6 @@ impl Iterator for Flight<'_> {
     }
 }
 
-impl Flight<'_> {
-    fn science_record(
-        &mut self,
-        now: &Now,
-        mode: Mode,
-        ranges: [Range; 3],
-        counts: [[i16; 3]; SAMPLES_PER_RECORD],
-        temperature_c: f64,
-    ) -> AccRecord {
-        let sequence = self.counters.records;
-        self.counters.records = (sequence + 1) & 0x3fff;
-        let quiet = self.mission.config.quiet.iter().any(|(from_s, to_s)| (*from_s..*to_s).contains(&now.clock_s));
-        AccRecord {
-            clock: Clock::from_tenths(i64::from(now.clock_s) * 10),
-            sequence,
-            orbiter_unix_ms: self.orbiter_unix_ms(),
-            counts,
-            temperature_c: as_sent_c(temperature_c),
-            mode,
-            quiet,
-            table_moving: now.segment.is_some_and(|s| s.step == Step::Moving),
-            at_rail: counts.as_flattened().iter().any(|count| AccRecord::is_at_rail(*count)),
-            ranges,
-            target: now.segment.map_or(0, |s| s.target),
-            step: now.segment.map_or(Step::None, |s| s.step),
-        }
-    }
-
-    fn housekeeping(&mut self, acc: &AccRecord, temperature_c: f64) -> Housekeeping {
-        let (level_v, scatter_v) = BUS_V;
-        let bus_v = level_v + scatter_v * self.clocks.random_range(-1.7..1.7);
-        // As the fields hold them, so that what is sent and what is read are one.
-        let hundredths = |c: f64| (c * 100.0).round() * 0.01;
-        Housekeeping {
-            clock: acc.clock,
-            sensor_temperature_c: hundredths(temperature_c),
-            electronics_temperature_c: hundredths(temperature_c + ELECTRONICS_ABOVE_C),
-            bus_v: (bus_v * 1000.0).round() * 0.001,
-            data_status: crate::ingest::wire::record::data_status(acc),
-            ranges: acc.ranges,
-            bias_calibrations: self.counters.bias_done,
-            scale_calibrations: self.counters.scale_done,
-        }
-    }
-
-    fn damage(&self, segment: Option<Segment>, science: bool) -> Option<Damage> {
-        let segment = segment.filter(|s| s.mode == Mode::Scale && s.step == Step::Rate)?;
-        let hit = self.mission.config.faults.iter().any(|fault| match fault {
-            Fault::MalformedScaleRecord { calibration_id, sequence } => {
-                *calibration_id == segment.calibration_id && *sequence == segment.sequence
-            }
-            _ => false,
-        });
-        match (hit, science) {
-            (true, false) => Some(Damage::CutShort),
-            (true, true) if self.clock_s == segment.from_s + 2 => Some(Damage::NoTime),
-            _ => None,
-        }
-    }
-}
-
-/// The temperature as the record's field can hold it.
-fn as_sent_c(temperature_c: f64) -> f32 {
-    let raw = crate::ingest::wire::record::raw_from_temperature(temperature_c);
-    ((32_768.0 - f64::from(raw)) * 20.0 / 65_536.0 * 20.0 - 17.8) as f32
-}
-
-fn table_report(acc: &AccRecord, segment: &Segment, angle_rad: f64, rate_rad_s: f64) -> TableReport {
-    TableReport {
-        clock: acc.clock,
-        mode: segment.mode,
-        step: segment.step,
-        target: segment.target,
-        ranges: acc.ranges,
-        calibration_id: segment.calibration_id,
-        angle_rad,
-        rate_rad_s,
-    }
-}
-
 /// First-order wander of the table's rate, unit variance, half a second of memory.
 struct Jitter {
     random: ChaCha8Rng,
@@ -500,8 +402,7 @@ impl Jitter {
 }
 
 /// Events of the plan that are no calibration's.
-fn plan_events(mission: &Mission) -> Vec<ScheduledEvent> {
-    let config = &mission.config;
+fn plan_events(config: &MissionConfig) -> Vec<ScheduledEvent> {
     let mut events =
         vec![(0, EventCode::PowerOn, 0, ""), (config.time.liftoff_clock_s as u32, EventCode::LiftOff, 0, "")];
     for (from_s, to_s) in &config.quiet {

@@ -83,6 +83,12 @@ impl Default for ForceModel {
     }
 }
 
+/// What acts on the sensor, whoever works it out.
+pub trait QuasiSteady {
+    /// Quasi-steady acceleration at the sensor, body axes, ng.
+    fn quasi_steady_ng(&self, clock_s: f64) -> Vec3;
+}
+
 /// The forces along a trajectory.
 pub struct Forces {
     model: ForceModel,
@@ -95,6 +101,17 @@ pub struct Forces {
     smooth_first_s: f64,
     /// Smooth part on its grid, ng.
     smooth_ng: Vec<Vec3>,
+}
+
+impl QuasiSteady for Forces {
+    /// Interpolated smooth forces, and the pushes.
+    fn quasi_steady_ng(&self, clock_s: f64) -> Vec3 {
+        let position = (clock_s - self.smooth_first_s) / FORCE_STEP_S;
+        let k = (position as usize).min(self.smooth_ng.len() - 2);
+        let (a, b) = (&self.smooth_ng[k], &self.smooth_ng[k + 1]);
+        let smooth = a + (b - a) * (position - k as f64);
+        self.model.pushes.iter().fold(smooth, |sum, push| sum + push.at(clock_s))
+    }
 }
 
 impl Forces {
@@ -142,15 +159,6 @@ impl Forces {
     /// Density at the vehicle, kg/m^3, as the forces take it.
     pub fn density_kg_m3(&self, clock_s: f64) -> f64 {
         self.air(clock_s).0.exp()
-    }
-
-    /// Quasi-steady acceleration at the sensor, body axes, ng: interpolated smooth forces, and the pushes.
-    pub fn quasi_steady_ng(&self, clock_s: f64) -> Vec3 {
-        let position = (clock_s - self.smooth_first_s) / FORCE_STEP_S;
-        let k = (position as usize).min(self.smooth_ng.len() - 2);
-        let (a, b) = (&self.smooth_ng[k], &self.smooth_ng[k + 1]);
-        let smooth = a + (b - a) * (position - k as f64);
-        self.model.pushes.iter().fold(smooth, |sum, push| sum + push.at(clock_s))
     }
 
     /// Smooth part at an instant, m/s^2, body axes, computed there and then.

@@ -193,6 +193,6 @@ impl Mission {
 
     /// Flies the mission: an iterator over its seconds.
     pub fn fly(&self) -> Flight<'_> {
-        Flight::new(self)
+        Flight::new(&self.config, &self.forces)
     }
 }

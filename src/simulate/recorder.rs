@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::ingest::wire::LinkConfig;
 use crate::ingest::wire::coding::{SYNC_MARKER, encode};
 
-use super::{Mission, Purpose, generator};
+use super::{Purpose, Second, generator};
 
 /// What tape and link do. Rates and chances are 0 for a clean dump.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,11 +107,11 @@ pub struct Playback {
     pub lost: Vec<usize>,
 }
 
-/// Every frame of a whole flight, on the recorder's channel.
-pub fn frames(mission: &Mission, link: LinkConfig) -> Vec<Vec<u8>> {
+/// Every frame of a flight's seconds, on the recorder's channel.
+pub fn frames(seconds: impl Iterator<Item = Second>, link: LinkConfig) -> Vec<Vec<u8>> {
     let (mut packetiser, mut framer) = (Packetiser::default(), Framer::new(link, 1, 0));
     let mut frames = Vec::new();
-    for second in mission.fly() {
+    for second in seconds {
         for sent in &second.sent {
             framer.push(&packetiser.packet(sent), |frame| frames.push(frame));
         }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::physics::Vec3;
 
 use super::faults::Fault;
-use super::flight::{Flight, Second};
+use super::flight::Second;
 use super::mission::Mission;
 
 /// Seconds of a window.
@@ -106,7 +106,7 @@ pub fn instrument_json(mission: &Mission) -> String {
         "time_h": hours,
         "order": "axis x,y,z (OARE axes) by range A,B,C; bias law [A1,A2,A3,A4,t0_h,t1_h], t = hours since lift-off",
     });
-    if let Some((from_s, to_s)) = Flight::new(mission).misreported() {
+    if let Some((from_s, to_s)) = mission.fly().misreported() {
         value["range_misreported"] =
             json!({"from_clock_s": f64::from(from_s), "to_clock_s": f64::from(to_s), "reported": "C", "true": "A"});
     }

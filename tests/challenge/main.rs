@@ -7,12 +7,13 @@
 
 use indicatif::ProgressBar;
 use oare_ground::challenge::conceal::{self, Kind, Manner};
-use oare_ground::challenge::engine::Engine;
+use oare_ground::challenge::engine::{self, Engine};
+use oare_ground::challenge::run::Material;
+use oare_ground::challenge::score::Rate;
 use oare_ground::challenge::{run, score, seal};
 use oare_ground::diagnose::Settings;
 use oare_ground::diagnose::analysis::Prepared;
 use oare_ground::diagnose::bootstrap::REACH;
-use oare_ground::diagnose::case::{Case, Header, Texts};
 use oare_ground::diagnose::null_table;
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -41,16 +42,7 @@ fn the_table_of_nulls_agrees_with_the_bootstrap() {
         .zip(SEED..)
         .flat_map(|(kind, seed)| {
             let concealed = conceal::draw(kind, seed);
-            let text = |name: &str| concealed.files.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone());
-            let header = Header::parse(&text("case.toml").unwrap(), &[]).unwrap();
-            let files = header.files.clone();
-            let texts = Texts {
-                recording: text(&files.recording),
-                simulation: text(&files.simulation),
-                ancillary: text(&files.ancillary),
-                events: text(&files.events),
-            };
-            let case = Case::from_texts(header, &texts).unwrap();
+            let case = engine::read(&Material::Files(&concealed.files)).unwrap();
             let prepared = Prepared::new(&case, &Settings::default()).unwrap();
             let bootstrap = prepared.bootstrap();
             let replicate = |i| {
@@ -82,9 +74,9 @@ fn the_table_of_nulls_agrees_with_the_bootstrap() {
     }
 }
 
-#[test]
-fn sixty_concealed_cases_refute_no_aim() {
-    let orders = run::plan(60, SEED, &Kind::ALL, Manner::default(), None);
+/// Cases drawn, sealed and analysed blind: the aims that they refute.
+fn refuted(cases: usize, manner: Manner) -> Vec<String> {
+    let orders = run::plan(cases, SEED, &Kind::ALL, manner, None);
     let progress = ProgressBar::hidden();
     let seals = run::seal(&orders, &progress);
     println!("commitment {}", seal::root(&seals));
@@ -92,20 +84,29 @@ fn sixty_concealed_cases_refute_no_aim() {
     let score = score::score(&outcomes);
     println!("{score}");
     assert!(score.failed.is_empty(), "cases without an answer: {:?}", score.failed);
-    let refuted: Vec<String> = score
-        .rates
-        .iter()
-        .filter(|rate| {
-            let (share, less) = aim(&rate.aim);
-            let (hits, of) = (rate.hits as u64, rate.of as u64);
-            // Exactly: so many hits or more, so many hits or fewer, of a program that just reaches the aim.
-            let reached = Binomial::new(share, of).unwrap();
-            let as_bad = if less { hits.checked_sub(1).map_or(1.0, |h| reached.sf(h)) } else { reached.cdf(hits) };
-            as_bad < CHANCE
-        })
-        .map(|rate| {
-            format!("{}: {} of {}, aim {}: {}", rate.name, rate.hits, rate.of, rate.aim, rate.look_at.join(" "))
-        })
-        .collect();
+    let refutes = |rate: &&Rate| {
+        let (share, less) = aim(&rate.aim);
+        let (hits, of) = (rate.hits as u64, rate.of as u64);
+        // Exactly: so many hits or more, so many hits or fewer, of a program that just reaches the aim.
+        let reached = Binomial::new(share, of).unwrap();
+        let as_bad = if less { hits.checked_sub(1).map_or(1.0, |h| reached.sf(h)) } else { reached.cdf(hits) };
+        as_bad < CHANCE
+    };
+    let told = |rate: &Rate| {
+        format!("{}: {} of {}, aim {}: {}", rate.name, rate.hits, rate.of, rate.aim, rate.look_at.join(" "))
+    };
+    score.rates.iter().filter(refutes).map(told).collect()
+}
+
+#[test]
+fn sixty_concealed_cases_refute_no_aim() {
+    let refuted = refuted(60, Manner::default());
+    assert!(refuted.is_empty(), "refuted:\n{}", refuted.join("\n"));
+}
+
+/// The same of recordings that are dumps, each from an instrument of its own that calibrates itself.
+#[test]
+fn forty_concealed_dumps_refute_no_aim() {
+    let refuted = refuted(40, Manner { dump: true, ..Manner::default() });
     assert!(refuted.is_empty(), "refuted:\n{}", refuted.join("\n"));
 }

@@ -1,11 +1,14 @@
 //! The diagnosis on the open cases, and its refusals. Shared data are read where they are; absent, the claim is skipped aloud.
 
 mod bursts;
+mod dump;
 mod separating;
 mod trial;
 
 use std::path::PathBuf;
 
+use oare_ground::challenge::engine;
+use oare_ground::challenge::run::Material;
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::case::{Case, Header, Texts};
 use oare_ground::diagnose::error::CaseError;
@@ -34,15 +37,8 @@ fn texts(id: &str) -> Option<(String, Texts)> {
 }
 
 /// A concealed case, from its files.
-fn case(files: &[(String, String)]) -> Case {
-    let text = |name: &str| files.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone());
-    let texts = Texts {
-        recording: text("recording.csv"),
-        simulation: text("simulation.csv"),
-        ancillary: text("ancillary.csv"),
-        events: text("events.csv"),
-    };
-    Case::from_texts(Header::parse(&text("case.toml").unwrap(), &[]).unwrap(), &texts).unwrap()
+fn case(files: &[(String, Vec<u8>)]) -> Case {
+    engine::read(&Material::Files(files)).unwrap()
 }
 
 fn answer(id: &str) -> Option<Diagnosis> {

@@ -6,6 +6,7 @@ use oare_ground::diagnose::case::{Case, Header, Texts};
 use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
 use oare_ground::physics::Vec3;
 use oare_ground::simulate::expected::case_files;
+use oare_ground::simulate::forces::QuasiSteady;
 use oare_ground::simulate::trajectory::{AttitudeHold, Hold};
 use oare_ground::simulate::{Mission, MissionConfig};
 use rand::SeedableRng;

@@ -6,7 +6,7 @@ use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::case::Case;
 use oare_ground::diagnose::{Analysis, Settings, analyse};
 
-fn files(kind: Kind, seed: u64, only: &'static str) -> Vec<(String, String)> {
+fn files(kind: Kind, seed: u64, only: &'static str) -> Vec<(String, Vec<u8>)> {
     draw_order(&Order { kind, seed, only: Some(only), manner: Manner::default() }).files
 }
 
@@ -29,12 +29,14 @@ fn a_finding_predicts_an_attitude_left_out_and_its_placebo_does_not_do_as_well()
 #[test]
 fn events_that_all_lie_in_one_half_of_the_long_blocks_are_parted_by_shorter_ones() {
     let mut files = files(Kind::Clean, 32, "cg_offset");
-    let edit = |files: &mut Vec<(String, String)>, name: &str, lines: &dyn Fn(Vec<&str>) -> Vec<String>| {
-        let text = &mut files.iter_mut().find(|(n, _)| n == name).unwrap().1;
-        *text = lines(text.lines().collect()).join("\n") + "\n";
+    let edit = |files: &mut Vec<(String, Vec<u8>)>, name: &str, lines: &dyn Fn(Vec<&str>) -> Vec<String>| {
+        let octets = &mut files.iter_mut().find(|(n, _)| n == name).unwrap().1;
+        let text = lines(std::str::from_utf8(octets).unwrap().lines().collect()).join("\n") + "\n";
+        *octets = text.into_bytes();
     };
     let clock = |line: &str| line.split(',').next().and_then(|t| t.parse::<f64>().ok());
-    let start = files.iter().find(|(n, _)| n == "recording.csv").unwrap().1.lines().find_map(clock).unwrap();
+    let recording = &files.iter().find(|(n, _)| n == "recording.csv").unwrap().1;
+    let start = std::str::from_utf8(recording).unwrap().lines().find_map(clock).unwrap();
     // Two dumps in the third quarter of the first day, both in an even block of six hours.
     let dumps = [start + 45_000.0, start + 60_000.0];
     edit(&mut files, "events.csv", &|lines| {

@@ -41,7 +41,7 @@ fn mission() -> &'static Flown {
         });
         let mission = Mission::new(config).unwrap();
         let link = LinkConfig::default();
-        let frames = frames(&mission, link);
+        let frames = frames(mission.fly(), link);
         let tape = |frames: &[Vec<u8>]| {
             playbacks(frames, &link, &RecorderConfig::clean(), 1).into_iter().flat_map(|p| p.octets).collect()
         };

@@ -121,7 +121,7 @@ fn a_late_frame_reopens_only_the_windows_it_touches() {
 fn simulated(hours: f64) -> Vec<u8> {
     let mission = Mission::new(MissionConfig::sts65(17, hours)).unwrap();
     let link = LinkConfig::default();
-    playbacks(&recorder::frames(&mission, link), &link, &RecorderConfig::clean(), 17)
+    playbacks(&recorder::frames(mission.fly(), link), &link, &RecorderConfig::clean(), 17)
         .into_iter()
         .flat_map(|pass| pass.octets)
         .collect()

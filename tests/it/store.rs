@@ -286,7 +286,7 @@ async fn fifty_kills_in_a_mission_lose_nothing() {
     const HOURS: f64 = 354.0;
     let mission = Mission::new(MissionConfig::sts65(65, HOURS)).unwrap();
     let link = LinkConfig::default();
-    let passes = playbacks(&frames(&mission, link), &link, &RecorderConfig::messy(), 65);
+    let passes = playbacks(&frames(mission.fly(), link), &link, &RecorderConfig::messy(), 65);
     let octets: Vec<u8> = passes.into_iter().flat_map(|pass| pass.octets).collect();
     kill_and_restart(&[octets], 50, 2.0, 65).await;
 }

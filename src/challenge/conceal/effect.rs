@@ -51,6 +51,20 @@ pub fn event_needed(id: &str) -> Option<&'static str> {
     }
 }
 
+/// Whether the effect accelerates the vehicle; the others are the sensor's.
+pub fn is_acceleration(id: &str) -> bool {
+    const SENSOR: [&str; 7] = [
+        "magnetic_sensitivity",
+        "scale_factor",
+        "misalignment",
+        "temperature_bias",
+        "bias_drift",
+        "bias_step",
+        "time_offset",
+    ];
+    !SENSOR.contains(&id)
+}
+
 /// The parts of the signal before anything is left out, on the 5 s grid.
 #[derive(Debug, Clone)]
 pub struct Signal {

@@ -12,6 +12,7 @@ pub mod law;
 mod matched;
 mod noise;
 mod record;
+mod tape;
 mod truth;
 
 use std::collections::BTreeMap;
@@ -20,12 +21,14 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha12Rng;
 
+use crate::math::rms::rms_about_mean;
 use draw::{log_between, pick};
 use effect::{Drawn, Signal};
 use flight::{Event, Flight, Freedom};
 use force::Series;
 use matched::{CONFUSABLE_SNR, Matched};
 use noise::Noise;
+use tape::Tape;
 pub use truth::Truth;
 
 /// What kind of question a case is.
@@ -86,6 +89,9 @@ pub struct Manner {
     pub other_physics: bool,
     /// Bursts in the noise, which the SNR does not know of.
     pub bursts: bool,
+    /// The recording is a dump of the payload recorder: the simulator's instrument feels what the flight has, calibrates itself, and
+    /// every calibration is to be worked out from what it sends.
+    pub dump: bool,
 }
 
 /// A case and its truth.
@@ -93,8 +99,8 @@ pub struct Manner {
 pub struct Concealed {
     /// Identity: kind and seed.
     pub id: String,
-    /// Name and text of each file.
-    pub files: Vec<(String, String)>,
+    /// Name and octets of each file.
+    pub files: Vec<(String, Vec<u8>)>,
     /// What was left out.
     pub truth: Truth,
 }
@@ -134,6 +140,8 @@ pub fn draw_order(order: &Order) -> Concealed {
 struct Question {
     flight: Flight,
     noise: Noise,
+    /// When the recording is a dump.
+    tape: Option<Tape>,
     kept: Vec<bool>,
     signal: Signal,
     felt: Series,
@@ -156,7 +164,14 @@ impl Question {
         let floor = 55.0 / noise.awake_ng[0];
         let factor = (1.0 - quieter).max(floor).min(1.0);
         noise.awake_ng = noise.awake_ng.map(|level| level * factor);
-        let kept = record::kept(rng, &flight);
+        let tape = order.manner.dump.then(|| Tape::new(order.seed, &flight, &mut noise));
+        if let Some(tape) = &tape {
+            flight.temperature_c = tape.temperature_c(&flight.times_s);
+        }
+        let kept = match &tape {
+            Some(tape) => tape.kept(&flight),
+            None => record::kept(rng, &flight),
+        };
         let target = |rng: &mut ChaCha12Rng| log_between(rng, if order.kind == Kind::One { 5.0 } else { 8.0 }, 40.0);
         let mut drawn: Vec<Drawn> =
             ids.iter().filter(|id| effect::IDS.contains(id)).map(|id| Drawn::draw(rng, id, &flight)).collect();
@@ -199,7 +214,7 @@ impl Question {
             _ => 1.0,
         };
         drop(matched);
-        Self { flight, noise, kept, signal, felt, parts, snr, apart, left }
+        Self { flight, noise, tape, kept, signal, felt, parts, snr, apart, left }
     }
 
     /// Whether the question can be asked: loud enough, of a possible size, and hard in the way its kind says.
@@ -233,18 +248,16 @@ impl Question {
         let mut suffix = String::new();
         suffix += if order.manner.other_physics { "-other" } else { "" };
         suffix += if order.manner.bursts { "-bursts" } else { "" };
+        suffix += if order.manner.dump { "-dump" } else { "" };
         let id = format!("{}-{:06}{suffix}", order.kind.word(), order.seed);
         let lacks_bulge = self.parts.iter().any(|(id, _, _)| id == "diurnal_bulge");
         let density_kg_m3 = record::simulated_density(&self.flight, lacks_bulge);
-        let parts = record::Parts {
-            id: &id,
-            simulated: &self.signal.simulated,
-            felt: &self.felt,
-            density_kg_m3: &density_kg_m3,
-            noise: &self.noise,
-            kept: &self.kept,
+        let recording = match &self.tape {
+            Some(tape) => tape.recording(rng, &self.flight, &self.felt, &self.noise, &self.kept),
+            None => record::windows(rng, &self.flight, &self.felt, &self.noise, &self.kept),
         };
-        let texts = record::texts(rng, &self.flight, &parts);
+        let noise_ng = recording.noise_ng;
+        let files = record::files(&id, &self.flight, recording, &self.signal.simulated, &density_kg_m3);
         let names = || self.parts.iter().map(|(id, _, _)| id.clone());
         let truth = Truth {
             case: id.clone(),
@@ -254,21 +267,17 @@ impl Question {
             snr_left: self.left.iter().map(|(id, left)| ((*id).to_string(), *left)).collect(),
             confusable: self.confusable().into_iter().map(str::to_string).collect(),
             part_rms_ng: self.parts.iter().map(|(id, _, series)| (id.clone(), self.rms_ng(series))).collect(),
-            noise_ng: texts.noise_ng,
+            noise_ng,
             slow_noise: (order.kind == Kind::Slow).then_some((self.noise.slow_ng, self.noise.slow_s)),
             deleted: (order.kind == Kind::Deleted).then(|| self.parts[0].0.clone()),
             seed: Some(order.seed),
         };
-        Concealed { id, files: texts.files, truth }
+        Concealed { id, files, truth }
     }
 
     /// RMS about the mean over the kept windows, ng.
     fn rms_ng(&self, series: &Series) -> [f64; 3] {
-        record::window_means(&self.flight, series).map(|axis| {
-            let kept: Vec<f64> = axis.iter().zip(&self.kept).filter(|(_, k)| **k).map(|(x, _)| *x).collect();
-            let mean = kept.iter().sum::<f64>() / kept.len() as f64;
-            (kept.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / kept.len() as f64).sqrt()
-        })
+        record::window_means(&self.flight, series).map(|axis| rms_about_mean(&record::kept_of(&axis, &self.kept)))
     }
 }
 
@@ -285,10 +294,16 @@ fn ids(rng: &mut ChaCha12Rng, order: &Order) -> Vec<&'static str> {
         Kind::Two => 2,
         Kind::One | Kind::Single | Kind::Deleted => 1,
     };
-    let list = if order.kind == Kind::Single { &IMITATED[..] } else { &effect::IDS[..] };
+    let list: Vec<&'static str> = match order.kind {
+        Kind::Single => IMITATED.to_vec(),
+        _ => effect::IDS.to_vec(),
+    };
+    // A calibration is there to take an instrument's own errors away: what a dump conceals is an acceleration.
+    let list: Vec<&'static str> =
+        list.into_iter().filter(|id| !order.manner.dump || effect::is_acceleration(id)).collect();
     let mut ids: Vec<&'static str> = order.only.into_iter().filter(|id| effect::IDS.contains(id)).collect();
     while ids.len() < count {
-        let id = *pick(rng, list);
+        let id = *pick(rng, &list);
         if !ids.contains(&id) {
             ids.push(id);
         }

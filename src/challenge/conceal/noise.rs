@@ -66,6 +66,17 @@ impl Noise {
         series
     }
 
+    /// The slow part alone, of an axis, on a grid of so many windows.
+    pub fn slow_series(&self, rng: &mut ChaCha12Rng, axis: usize, windows: usize) -> Vec<f64> {
+        let keep = keep(self.slow_s);
+        let mut now = normal(rng);
+        let mut next = || {
+            now = keep * now + (1.0 - keep * keep).sqrt() * normal(rng);
+            self.slow_ng[axis] * now
+        };
+        (0..windows).map(|_| next()).collect()
+    }
+
     /// Standard deviation of the quick part, ng.
     pub fn level_ng(&self, axis: usize, awake: f64) -> f64 {
         self.awake_ng[axis] * (self.asleep + (1.0 - self.asleep) * awake)

@@ -10,6 +10,7 @@ use super::flight::{FILE_STRIDE, Flight, LENGTH_S, MARGIN_S, STEP_S};
 use super::force;
 use super::noise::Noise;
 use crate::diagnose::case::WINDOW_STRIDE_S;
+use crate::math::rms::rms_about_mean;
 
 /// Half of a window, in points of the 5 s grid.
 const HALF_WINDOW: usize = 5;
@@ -62,56 +63,67 @@ pub fn kept(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<bool> {
     centres.iter().map(|t| !lost.iter().any(|(from, to)| t > from && t < to)).collect()
 }
 
-/// The texts of a case, by file name.
-pub struct Texts {
-    /// `case.toml`, `recording.csv`, `simulation.csv`, `ancillary.csv`, `events.csv`.
-    pub files: Vec<(String, String)>,
-    /// Standard deviation of the noise actually drawn, ng.
+/// The recording of a case: how `case.toml` calls it, its octets, and the noise in it.
+pub struct Recording {
+    /// `acceleration_csv` or `recorder_dump`.
+    pub kind: &'static str,
+    /// Name of its file.
+    pub file: &'static str,
+    /// What is in it.
+    pub octets: Vec<u8>,
+    /// Standard deviation of the noise in the windows that arrive, ng.
     pub noise_ng: [f64; 3],
 }
 
-/// What the writer needs beside the flight.
-pub struct Parts<'a> {
-    /// Identity of the case.
-    pub id: &'a str,
-    /// What the simulation expects, ng.
-    pub simulated: &'a [Vector3<f64>],
-    /// What the sensor feels, ng.
-    pub felt: &'a [Vector3<f64>],
-    /// Density the simulation used, kg/m^3.
-    pub density_kg_m3: &'a [f64],
-    /// The noise.
-    pub noise: &'a Noise,
-    /// Windows that arrive.
-    pub kept: &'a [bool],
-}
-
-/// Writes the files of a case.
-pub fn texts(rng: &mut ChaCha12Rng, flight: &Flight, parts: &Parts) -> Texts {
+/// What the sensor feels as calibrated windows, with noise and a constant that a bias fit would leave.
+pub fn windows(
+    rng: &mut ChaCha12Rng,
+    flight: &Flight,
+    felt: &[Vector3<f64>],
+    noise: &Noise,
+    kept: &[bool],
+) -> Recording {
     let awake = awake(flight);
-    let means = window_means(flight, parts.felt);
-    let noise: [Vec<f64>; 3] = std::array::from_fn(|axis| parts.noise.series(rng, axis, &awake));
-    let noise_ng = std::array::from_fn(|axis| {
-        let kept: Vec<f64> = noise[axis].iter().zip(parts.kept).filter(|(_, k)| **k).map(|(x, _)| *x).collect();
-        let mean = kept.iter().sum::<f64>() / kept.len() as f64;
-        (kept.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / kept.len() as f64).sqrt()
-    });
+    let means = window_means(flight, felt);
+    let drawn: [Vec<f64>; 3] = std::array::from_fn(|axis| noise.series(rng, axis, &awake));
     let bias = Vector3::from_fn(|_, _| 60.0 * normal(rng));
-    let dev = deviations(rng, parts.noise, &awake);
+    let dev = deviations(rng, noise, &awake);
     let mut recording = String::from("clock_s,ax_ng,ay_ng,az_ng,dev_x_ng,dev_y_ng,dev_z_ng\n");
-    for (w, t) in centres_s(flight).into_iter().enumerate().filter(|(w, _)| parts.kept[*w]) {
-        let a: [f64; 3] = std::array::from_fn(|i| means[i][w] + noise[i][w] + bias[i]);
+    for (w, t) in centres_s(flight).into_iter().enumerate().filter(|(w, _)| kept[*w]) {
+        let a: [f64; 3] = std::array::from_fn(|i| means[i][w] + drawn[i][w] + bias[i]);
         let d: [f64; 3] = std::array::from_fn(|i| dev[i][w]);
         row(&mut recording, &format!("{t:.1}"), &[(&a, 2), (&d, 1)]);
     }
-    let files = vec![
-        ("case.toml".to_string(), case_toml(parts.id, flight)),
-        ("recording.csv".to_string(), recording),
-        ("simulation.csv".to_string(), simulation(flight, parts.simulated)),
-        ("ancillary.csv".to_string(), ancillary(flight, parts.density_kg_m3)),
-        ("events.csv".to_string(), events(flight)),
-    ];
-    Texts { files, noise_ng }
+    Recording {
+        kind: "acceleration_csv",
+        file: "recording.csv",
+        octets: recording.into_bytes(),
+        noise_ng: drawn.map(|axis| rms_about_mean(&kept_of(&axis, kept))),
+    }
+}
+
+/// Those that arrive.
+pub fn kept_of(series: &[f64], kept: &[bool]) -> Vec<f64> {
+    series.iter().zip(kept).filter(|(_, kept)| **kept).map(|(x, _)| *x).collect()
+}
+
+/// The files of a case, by name: what the simulation expects, ng, and the density it used, kg/m^3, beside the recording.
+pub fn files(
+    id: &str,
+    flight: &Flight,
+    recording: Recording,
+    simulated: &[Vector3<f64>],
+    density_kg_m3: &[f64],
+) -> Vec<(String, Vec<u8>)> {
+    let toml = case_toml(id, flight, &recording);
+    let of = |name: &str, octets: Vec<u8>| (name.to_string(), octets);
+    vec![
+        of("case.toml", toml.into_bytes()),
+        of(recording.file, recording.octets),
+        of("simulation.csv", simulation(flight, simulated).into_bytes()),
+        of("ancillary.csv", ancillary(flight, density_kg_m3).into_bytes()),
+        of("events.csv", events(flight).into_bytes()),
+    ]
 }
 
 /// Average deviation in each window: about four times the mean's noise, and as scattered as on the open cases.
@@ -183,7 +195,8 @@ fn events(flight: &Flight) -> String {
     text
 }
 
-fn case_toml(id: &str, flight: &Flight) -> String {
+fn case_toml(id: &str, flight: &Flight, recording: &Recording) -> String {
+    let Recording { kind, file, .. } = recording;
     let v = &flight.vehicle;
     let (a, s) = (v.area_m2, v.sensor_offset_m);
     format!(
@@ -191,7 +204,7 @@ fn case_toml(id: &str, flight: &Flight) -> String {
          [vehicle]\nmass_kg = {:.1}\ndrag_coefficient = {:.1}\narea_m2 = [{:.1}, {:.1}, {:.1}]\n\
          sensor_offset_m = [{:.4}, {:.4}, {:.4}]\nsrp_coefficient = 1.3\n\n\
          [simulation]\nfile = \"simulation.csv\"\nincludes = [\"gravity_gradient\", \"rotation\", \"aerodynamic_drag\"]\n\n\
-         [recording]\nfile = \"recording.csv\"\nkind = \"acceleration_csv\"\n\n\
+         [recording]\nfile = \"{file}\"\nkind = \"{kind}\"\n\n\
          [ancillary]\nfile = \"ancillary.csv\"\nevents = \"events.csv\"\n",
         Flight::mission().epoch_utc,
         flight.start_s,

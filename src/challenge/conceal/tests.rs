@@ -1,6 +1,9 @@
 //! The generator's own claims, without an analyser.
 
 use super::*;
+use crate::diagnose::case::Header;
+use crate::diagnose::recorder::recording_csv;
+use crate::math::rms::rms;
 
 fn column(text: &str, name: &str) -> Vec<f64> {
     let mut lines = text.lines();
@@ -9,7 +12,7 @@ fn column(text: &str, name: &str) -> Vec<f64> {
 }
 
 fn file<'a>(case: &'a Concealed, name: &str) -> &'a str {
-    &case.files.iter().find(|(n, _)| n == name).unwrap().1
+    std::str::from_utf8(&case.files.iter().find(|(n, _)| n == name).unwrap().1).unwrap()
 }
 
 #[test]
@@ -56,7 +59,7 @@ fn drawn_effects_have_a_fair_snr_and_are_not_confused_with_themselves() {
             kind: Kind::One,
             seed: seed as u64,
             only: Some(id),
-            manner: Manner { other_physics: seed % 2 == 0, bursts: false },
+            manner: Manner { other_physics: seed % 2 == 0, ..Manner::default() },
         };
         let case = draw_order(&order);
         let snr = case.truth.snr[*id];
@@ -89,5 +92,28 @@ fn the_twenty_second_files_carry_the_signal() {
             // A thirtieth of the quietest noise: no finding on a clean record can come from the grid.
             assert!(rms < 1.0, "seed {seed}: {rms} ng");
         }
+    }
+}
+
+#[test]
+fn a_dump_holds_what_the_sensor_felt_at_the_loudness_its_truth_says() {
+    let manner = Manner { dump: true, ..Manner::default() };
+    let case = draw_order(&Order { kind: Kind::Clean, seed: 3, only: None, manner });
+    assert!(file(&case, "case.toml").contains("kind = \"recorder_dump\""));
+    let header = Header::parse(file(&case, "case.toml"), &[]).unwrap();
+    let dump = &case.files.iter().find(|(n, _)| n == "recording.dump").unwrap().1;
+    let recording = recording_csv(dump, &header);
+    // Calibrated from the dump alone; a window differs from the next by its noise, of which they share half the samples.
+    for (axis, name) in ["ax_ng", "ay_ng", "az_ng"].into_iter().enumerate() {
+        let (clock, a) = (column(&recording, "clock_s"), column(&recording, name));
+        assert!(clock.len() > 4000, "{}", clock.len());
+        let grid = column(file(&case, "simulation.csv"), "clock_s");
+        let simulated = column(file(&case, "simulation.csv"), name);
+        let left: Vec<f64> =
+            clock.iter().zip(&a).map(|(t, a)| a - effect::at(&simulated, (t - grid[0]) / 20.0)).collect();
+        let steps: Vec<f64> = left.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let (found, told) = (rms(&steps), case.truth.noise_ng[axis]);
+        // A trimmed mean of normal samples scatters a few parts in a hundred more than a mean; bursts add to it.
+        assert!((0.97..1.15).contains(&(found / told)), "{name}: {found} ng, and {told} ng told");
     }
 }

@@ -1,6 +1,6 @@
 //! Drag off by a fraction: drag coefficient, area or density wrong by a factor, or the whole term absent.
 
-use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_volume, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,7 +12,6 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["scale_factor of the ram axis", "a bias in a fixed attitude", "atmosphere_corotation"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.5, size_max: 3.0, whole: false }],
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

@@ -1,6 +1,6 @@
 //! The atmosphere turns with the Earth: drag with co-rotation less drag without.
 
-use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_volume, one_point};
 use crate::diagnose::scene::Scene;
 use crate::physics::Vec3;
 
@@ -13,7 +13,6 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["thermospheric_wind", "a yaw misalignment", "aerodynamic_drag"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.7, size_max: 2.0, whole: true }],
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

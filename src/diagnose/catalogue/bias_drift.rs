@@ -1,6 +1,6 @@
 //! The bias decays exponentially; amplitudes refer to the first instant of the simulation.
 
-use super::{COMMON, Effect, Nonlinear, Shape, Theta, push};
+use super::{Effect, Nonlinear, Shape, Theta, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -13,7 +13,6 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["vent_leak", "temperature_bias", "a trend of density"],
     linear: &push(150.0, 20000.0),
     nonlinear: &[Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.2, range: [7.6, 13.5] }],
-    log_prior: COMMON,
     grid,
     log_volume,
     signature,

@@ -1,6 +1,6 @@
 //! The bias steps at an instant and stays.
 
-use super::{COMMON, Effect, Nonlinear, Shape, Theta, onsets, push};
+use super::{Effect, Nonlinear, Shape, Theta, onsets, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -19,7 +19,6 @@ pub const EFFECT: Effect = Effect {
         step: 300.0,
         range: [f64::NEG_INFINITY, f64::INFINITY],
     }],
-    log_prior: COMMON,
     grid,
     log_volume,
     signature,

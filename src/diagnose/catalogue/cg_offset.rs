@@ -2,7 +2,7 @@
 
 use crate::units::NANO_G_M_S2;
 
-use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_volume, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -18,7 +18,6 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "dz_m", unit: "m", size: 0.6, size_max: 3.0, whole: false },
     ],
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

@@ -1,6 +1,6 @@
 //! A shift between sleep and wake, wake minus sleep.
 
-use super::{COMMON, Effect, Shape, lasting, no_volume, one_point, push};
+use super::{Effect, Shape, lasting, no_volume, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,7 +12,6 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["a daily temperature cycle"],
     linear: &push(20.0, 500.0),
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

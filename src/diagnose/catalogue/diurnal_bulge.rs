@@ -1,6 +1,6 @@
 //! Day-night variation of density: a_d cos psi, psi from the apex 30 degrees east of the Sun.
 
-use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_volume, one_point};
 use crate::diagnose::scene::Scene;
 use crate::physics::bulge;
 
@@ -13,7 +13,6 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["solar_radiation_pressure", "temperature_bias"],
     linear: &[Linear { name: "amplitude", unit: "1", size: 0.4, size_max: 2.0, whole: false }],
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

@@ -1,6 +1,6 @@
 //! The sensor feels the geomagnetic field: a = K B in body axes.
 
-use super::{COMMON, Effect, Linear, Shape, no_volume, one_point};
+use super::{Effect, Linear, Shape, no_volume, one_point};
 use crate::diagnose::design::Raw;
 use crate::diagnose::scene::Scene;
 
@@ -23,7 +23,6 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "kzz_ng_per_t", unit: "ng/T", size: 1.0e6, size_max: 2.0e7, whole: false },
     ],
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

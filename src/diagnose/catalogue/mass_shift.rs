@@ -2,7 +2,7 @@
 
 use crate::units::NANO_G_M_S2;
 
-use super::{COMMON, Effect, Linear, Nonlinear, Shape, Theta};
+use super::{Effect, Linear, Nonlinear, Shape, Theta};
 use crate::diagnose::design::Raw;
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
@@ -26,7 +26,6 @@ pub const EFFECT: Effect = Effect {
         step: 0.0,
         range: [f64::NEG_INFINITY, f64::INFINITY],
     }],
-    log_prior: COMMON,
     grid,
     log_volume,
     signature,

@@ -1,6 +1,6 @@
 //! The sensor's axes are turned by a small right-handed angle r: recorded = a + a x r.
 
-use super::{COMMON, Effect, Linear, Shape, no_volume, one_point};
+use super::{Effect, Linear, Shape, no_volume, one_point};
 use crate::diagnose::design::Raw;
 use crate::diagnose::scene::Scene;
 
@@ -17,7 +17,6 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "rz_rad", unit: "rad", size: 0.08, size_max: 0.6, whole: false },
     ],
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

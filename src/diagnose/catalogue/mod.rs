@@ -77,8 +77,6 @@ pub struct Effect {
     pub linear: &'static [Linear],
     /// Nonlinear parameters, in the order of [`Theta`].
     pub nonlinear: &'static [Nonlinear],
-    /// Natural log of its prior odds against being absent.
-    pub log_prior: f64,
     /// Starting points over the whole prior range.
     pub grid: fn(&Scene) -> Vec<Theta>,
     /// Log of the prior volume of `Theta` in its coordinates (of the number of points, if they are discrete).
@@ -196,8 +194,8 @@ pub fn no_volume(_: &Scene) -> f64 {
     0.0
 }
 
-/// Prior odds of an effect that is met as often as any other: about one in fifty records each.
-pub const COMMON: f64 = -4.0;
+/// Natural log of the prior odds of every effect against its being absent: about one in fifty records has it.
+pub const LOG_PRIOR: f64 = -4.0;
 
 /// Three coefficients of a push fixed in the body.
 pub const fn push(size_ng: f64, size_max_ng: f64) -> [Linear; 3] {
@@ -247,7 +245,7 @@ mod tests {
             );
             assert!(!e.linear.is_empty() || !e.nonlinear.is_empty(), "{} has nothing to fit", e.id);
             assert!(e.linear.iter().all(|l| l.size > 0.0 && l.size_max > 2.0 * l.size), "{}: sizes", e.id);
-            assert!(e.nonlinear.len() <= 2 && e.log_prior < 0.0, "{}", e.id);
+            assert!(e.nonlinear.len() <= 2, "{}", e.id);
             assert_eq!(by_id(e.id).map(|x| x.name), Some(e.name));
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::units::NANO_G_M_S2;
 
-use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_volume, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -14,7 +14,6 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["cg_offset"],
     linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0, whole: true }],
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

@@ -1,6 +1,6 @@
 //! One axis reads (1 + fraction) times the truth.
 
-use super::{COMMON, Effect, Linear, Nonlinear, Shape, Theta};
+use super::{Effect, Linear, Nonlinear, Shape, Theta};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,7 +12,6 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["aerodynamic_drag"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 1.5, whole: false }],
     nonlinear: &[Nonlinear { name: "axis", unit: "", log: false, step: 0.0, range: [0.0, 2.0] }],
-    log_prior: COMMON,
     grid,
     log_volume,
     signature,

@@ -1,6 +1,6 @@
 //! Bias follows the sensor temperature, perhaps late.
 
-use super::{COMMON, Effect, Linear, Nonlinear, Shape, Theta};
+use super::{Effect, Linear, Nonlinear, Shape, Theta};
 use crate::diagnose::measure::Measurement;
 use crate::diagnose::scene::Scene;
 
@@ -17,7 +17,6 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "slope_z_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, whole: false },
     ],
     nonlinear: &[Nonlinear { name: "lag_s", unit: "s", log: false, step: 200.0, range: [0.0, 28_800.0] }],
-    log_prior: COMMON,
     grid,
     log_volume,
     signature,

@@ -1,6 +1,6 @@
 //! Wind beside co-rotation, steady along and across the track: the derivative of drag by wind.
 
-use super::{COMMON, Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_volume, one_point};
 use crate::diagnose::scene::Scene;
 use crate::physics::{Vec3, drag};
 
@@ -16,7 +16,6 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "cross_m_s", unit: "m/s", size: 150.0, size_max: 800.0, whole: false },
     ],
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

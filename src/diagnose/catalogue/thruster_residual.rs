@@ -1,6 +1,6 @@
 //! A push while a logged event of kind `thruster` lasts.
 
-use super::{COMMON, Effect, Shape, added, no_volume, one_point, push};
+use super::{Effect, Shape, added, no_volume, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,7 +12,6 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["attitude deadband: jets fire at its edges"],
     linear: &push(150.0, 3000.0),
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

@@ -1,6 +1,6 @@
 //! The recording's clock runs ahead: what happened at t is labelled t + offset.
 
-use super::{COMMON, Effect, Nonlinear, Shape, Theta};
+use super::{Effect, Nonlinear, Shape, Theta};
 use crate::diagnose::measure::Measurement;
 use crate::diagnose::scene::Scene;
 
@@ -13,7 +13,6 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["an attitude latency (the same)"],
     linear: &[],
     nonlinear: &[Nonlinear { name: "offset_s", unit: "s", log: false, step: 3.0, range: [-600.0, 600.0] }],
-    log_prior: COMMON,
     grid,
     log_volume,
     signature,

@@ -1,6 +1,6 @@
 //! A decaying push fixed in the body from an unlogged instant.
 
-use super::{COMMON, Effect, Nonlinear, Shape, Theta, onsets, push};
+use super::{Effect, Nonlinear, Shape, Theta, onsets, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -16,7 +16,6 @@ pub const EFFECT: Effect = Effect {
         Nonlinear { name: "onset_s", unit: "s", log: false, step: 300.0, range: [f64::NEG_INFINITY, f64::INFINITY] },
         Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, range: [5.7, 11.5] },
     ],
-    log_prior: COMMON,
     grid,
     log_volume,
     signature,

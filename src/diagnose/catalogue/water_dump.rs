@@ -1,6 +1,6 @@
 //! A push while a logged event of kind `water_dump` lasts.
 
-use super::{COMMON, Effect, Shape, lasting, no_volume, one_point, push};
+use super::{Effect, Shape, lasting, no_volume, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,7 +12,6 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["nearly nothing"],
     linear: &push(300.0, 5000.0),
     nonlinear: &[],
-    log_prior: COMMON,
     grid: one_point,
     log_volume: no_volume,
     signature,

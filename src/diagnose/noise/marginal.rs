@@ -1,6 +1,6 @@
 //! The slow part of the noise, marginalised: what a residual gains by slow noise, and what it costs to have chosen it.
 
-use super::filter::products;
+use super::filter::{Products, Series, products};
 use super::{AxisNoise, Loudness, Schedule};
 use crate::math::shared_work;
 
@@ -48,10 +48,10 @@ pub fn slow_part_marginalised(
     let groups: Vec<&[(usize, AxisNoise, f64)]> = trials.chunks(LANES).collect();
     let weighed = |group: &&[(usize, AxisNoise, f64)]| {
         let lane: [&(usize, AxisNoise, f64); LANES] = std::array::from_fn(|l| &group[l.min(group.len() - 1)]);
-        let found =
-            products(&lane.map(|t| t.1), schedule, lane.map(|t| &loudness[t.0]), lane.map(|t| &residual_ng[t.0][..]));
-        let likelihood = |([dd, dc, cc], log_det): ([f64; 3], f64)| -0.5 * (log_det + dd - dc * dc / cc + cc.ln());
-        found.into_iter().take(group.len()).map(likelihood).collect::<Vec<f64>>()
+        let series = lane.map(|t| Series { data: &residual_ng[t.0], shared: &schedule.shared_ng[t.0] });
+        let found = products(&lane.map(|t| t.1), schedule, lane.map(|t| &loudness[t.0]), series);
+        let likelihood = |products: &Products| products.log_likelihood(1.0);
+        found.iter().take(group.len()).map(likelihood).collect::<Vec<f64>>()
     };
     let likelihoods: Vec<f64> = shared_work::map(&groups, weighed).into_iter().flatten().collect();
     let per_axis = trials.len() / 3;

@@ -16,7 +16,7 @@ mod marginal;
 
 pub use binned::{BIN_S, Binned};
 pub use filter::Whitener;
-use filter::products;
+use filter::{Series, products};
 pub use loudness::Loudness;
 pub use marginal::{SlowPart, slow_part_marginalised};
 
@@ -116,9 +116,11 @@ pub fn log_prior_but_slow(noise: &AxisNoise) -> f64 {
     lognormal(noise.short_ng / noise.white_ng, 0.2, 0.6) + lognormal(noise.short_tau_s, 100.0, 0.6)
 }
 
-/// Fit the noise of several axes side by side, each to its residual, whose constant is nuisance; from `start` if there is one.
+/// Fit the noise of several axes side by side, each to its residual, in which a constant and `shared_ng` are nuisance; from `start`
+/// if there is one.
 pub fn fit<const L: usize>(
     residual_ng: [&[f64]; L],
+    shared_ng: [&[Vec<f64>]; L],
     schedule: &Schedule,
     loudness: [&Loudness; L],
     start: Option<[&AxisNoise; L]>,
@@ -136,16 +138,15 @@ pub fn fit<const L: usize>(
         slow_ng: scale_ng * p[2].exp(),
         slow_tau_s: p[3].exp(),
     };
+    let series: [Series; L] = std::array::from_fn(|l| Series { data: residual_ng[l], shared: shared_ng[l] });
     // The overall scale is profiled: one rescaling step is exact up to the prior of the slow amplitude.
     let evaluate = |points: [&[f64]; L]| {
         let unit = std::array::from_fn(|l| noise_of(points[l], rms_ng[l]));
-        let found = products(&unit, schedule, loudness, residual_ng);
+        let found = products(&unit, schedule, loudness, series);
         std::array::from_fn::<(AxisNoise, f64), L, _>(|l| {
-            let ([dd, dc, cc], log_det) = found[l];
-            let scale2 = (dd - dc * dc / cc) / (n - 1.0);
+            let scale2 = found[l].likeliest_scale2();
             let noise = noise_of(points[l], rms_ng[l] * (0.5 * scale2.ln()).exp());
-            let log_likelihood = -0.5 * (log_det + (n - 1.0) * (scale2.ln() + 1.0) + cc.ln());
-            (noise, log_likelihood + log_prior(&noise))
+            (noise, found[l].log_likelihood(scale2) + log_prior(&noise))
         })
     };
     let width = if start.is_some() { [0.25, 0.25, 0.4, 0.4] } else { [0.5, 0.5, 0.8, 0.8] };
@@ -267,7 +268,7 @@ mod tests {
         let schedule = gappy();
         let loudness = Loudness::even(vec![1.0; schedule.len()]);
         let x = simulate(&noise, &schedule, &loudness, normals(11));
-        let [found] = fit([&x], &schedule, [&loudness], None, 150);
+        let [found] = fit([&x], [&[]], &schedule, [&loudness], None, 150);
         assert!((found.white_ng / 100.0 - 1.0).abs() < 0.1, "{found:?}");
         assert!((found.slow_ng / 30.0).ln().abs() < 0.5, "{found:?}");
     }

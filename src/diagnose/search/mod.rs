@@ -14,7 +14,7 @@ pub use imitate::imitation;
 pub use refine::refine;
 pub use weigh::{Left, Weighed, fit_noise, residual, weigh_with_own_noise};
 
-use super::catalogue::{Effect, Shape, Theta};
+use super::catalogue::{Effect, LOG_PRIOR, Shape, Theta};
 use super::design::{Chosen, Column, Frame, OnAxis};
 use super::scene::{Axes, Scene};
 use crate::math::shared_work;
@@ -69,7 +69,7 @@ impl Entry {
             .collect();
         (!points.is_empty()).then(|| Self {
             family: Family::Listed(effect),
-            log_prior: effect.log_prior,
+            log_prior: LOG_PRIOR,
             log_volume: (effect.log_volume)(scene),
             points,
             sizes: effect.linear.iter().map(|l| l.size).collect(),

@@ -71,7 +71,8 @@ pub fn fit_noise(
     evaluations: usize,
 ) -> [AxisNoise; 3] {
     let residual = residual_ng.each_ref().map(|x| &x[..]);
-    noise::fit(residual, &scene.schedule, scene.loudness.each_ref(), start.map(|s| s.each_ref()), evaluations)
+    let shared = scene.schedule.shared_ng.each_ref().map(|x| &x[..]);
+    noise::fit(residual, shared, &scene.schedule, scene.loudness.each_ref(), start.map(|s| s.each_ref()), evaluations)
 }
 
 /// Weigh a set with its own noise: alternately noise and coefficients, `rounds` times.

@@ -1,0 +1,36 @@
+//! Recordings that are dumps of the payload recorder, on concealed cases: what a calibration leaves open is no finding.
+
+use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
+use oare_ground::diagnose::answer::Verdict;
+use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
+
+fn answer(kind: Kind, seed: u64, only: Option<&'static str>) -> Diagnosis {
+    let manner = Manner { dump: true, ..Manner::default() };
+    let concealed = draw_order(&Order { kind, seed, only, manner });
+    diagnose(&super::case(&concealed.files), &Settings::default()).unwrap()
+}
+
+/// The bias of these two is fitted 2.4 standard errors off: 70 ng along y, and 42 ng along z, that come and go over a day and a half.
+#[test]
+fn a_bias_fitted_two_standard_errors_off_is_no_finding() {
+    for seed in [1017, 1030] {
+        let found = answer(Kind::Clean, seed, None);
+        assert_eq!(found.verdict, Verdict::Consistent, "{seed}: {found:?}");
+    }
+}
+
+#[test]
+fn an_acceleration_in_a_dump_is_named_and_sized() {
+    let found = answer(Kind::One, 1001, Some("cg_offset"));
+    assert_eq!((found.verdict, found.effects[0].id.as_str()), (Verdict::Explained, "cg_offset"), "{found:?}");
+    assert!(found.effects[0].parameters.iter().all(|p| p.sigma > 0.0 && p.sigma < 0.2), "{found:?}");
+}
+
+/// What the calibration leaves open goes on into an observation to come.
+#[test]
+fn sets_that_a_dump_cannot_tell_apart_have_an_observation_that_would() {
+    let found = answer(Kind::Two, 1012, None);
+    assert_eq!(found.verdict, Verdict::Ambiguous, "{found:?}");
+    let observation = found.separating_observation.unwrap();
+    assert!(observation.gain.is_some_and(|gain| gain > 0.0), "{observation:?}");
+}
