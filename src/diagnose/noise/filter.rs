@@ -2,6 +2,7 @@
 //!
 //! Every step of a filter needs the one before, so that one series after another waits for itself; several are taken side by side.
 
+use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
 
 use super::{AxisNoise, Loudness, Schedule};
@@ -148,6 +149,14 @@ impl<const L: usize> Memory<L> {
 /// Windows between two looks at whether all of them are over.
 const CHUNK: usize = 64;
 
+/// Values become their whitened innovations, all by one filter.
+#[multiversion(targets("x86_64+avx+avx2"))]
+fn whiten_chunk<const L: usize>(memory: &mut Memory<L>, rows: &[Row<1>], values: &mut [[f64; L]]) {
+    for (value, row) in values.iter_mut().zip(rows) {
+        *value = memory.whiten_alike(row, *value);
+    }
+}
+
 /// Where what a filter remembers of a series is negligible.
 struct Tail {
     last: usize,
@@ -237,9 +246,7 @@ impl Whitener {
             for (l, series) in series.iter().enumerate() {
                 values.iter_mut().zip(&series[chunk..end]).for_each(|(value, x)| value[l] = *x);
             }
-            for (value, row) in values.iter_mut().zip(&self.rows[chunk..end]) {
-                *value = memory.whiten_alike(row, *value);
-            }
+            whiten_chunk(&mut memory, &self.rows[chunk..end], &mut values);
             for (l, out) in out.iter_mut().enumerate() {
                 out.extend(values[..end - chunk].iter().map(|value| value[l]));
             }
@@ -330,6 +337,7 @@ impl Products {
 }
 
 /// Products of several series in one pass, each with noise and loudness of its own.
+#[multiversion(targets("x86_64+avx+avx2"))]
 pub(super) fn products<const L: usize>(
     noise: &[AxisNoise; L],
     schedule: &Schedule,

@@ -20,6 +20,8 @@ use filter::{Series, products};
 pub use loudness::Loudness;
 pub use marginal::{SlowPart, slow_part_marginalised};
 
+use multiversion::multiversion;
+
 use super::optimise::Simplex;
 
 /// Noise of one axis.
@@ -186,6 +188,7 @@ const BOUNDS: [[f64; 2]; 4] = [[-6.0, 1.5], [2.0, 7.0], [-9.0, 4.0], [5.0, 10.5]
 const MIDDLE: [f64; 4] = [-2.0, 4.5, -2.5, 7.5];
 
 /// Dot product.
+#[multiversion(targets("x86_64+avx+avx2"))]
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; 8];
     let (ca, cb) = (a.chunks_exact(8), b.chunks_exact(8));
