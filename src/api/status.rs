@@ -255,6 +255,7 @@ fn note(app: &App) {
 fn note_diagnosis(report: &Report) {
     let progress = &report.progress;
     counter!("oare_diagnosis_searches_total").absolute(progress.milestones.searches);
+    counter!("oare_diagnosis_searches_failed_total").absolute(progress.milestones.searches_failed);
     counter!("oare_diagnosis_alarms_withdrawn_total").absolute(progress.milestones.alarms_withdrawn);
     gauge!("oare_diagnosis_searching").set(f64::from(u8::from(progress.state == Progress::Searching)));
     gauge!("oare_diagnosis_windows_seen").set(progress.windows_seen as f64);

@@ -77,6 +77,9 @@ pub struct Milestones {
     pub name: Vec<String>,
     /// Alarms that a later look took back.
     pub alarms_withdrawn: u64,
+    /// Looks that failed, by a defect of the program.
+    #[serde(default)]
+    pub searches_failed: u64,
 }
 
 /// Where the running diagnosis is.
@@ -91,6 +94,8 @@ pub enum State {
     Current,
     /// The windows so far cannot be compared with the simulation; the sentence says why.
     Refused,
+    /// The last search failed, by a defect of the program: the answer is that of the look before.
+    Failed,
 }
 
 /// How far it is.
@@ -244,6 +249,19 @@ impl Live {
         self.note(&diagnosis, log_odds);
         self.diagnosis = diagnosis;
         true
+    }
+
+    /// Notes that the look at `seen` failed, by a defect of the program: the answer stays that of the look before, and when more windows
+    /// come they are looked at with all others.
+    pub fn failed(&mut self, seen: Seen) {
+        self.seen = seen;
+        self.state = State::Failed;
+        self.milestones.searches_failed += 1;
+        self.sentence = format!(
+            "The search over the {} windows so far failed, by a defect of the program that its log tells; the answer is that of the {} \
+             windows searched before. The next windows are searched with all others.",
+            seen.windows, self.windows_searched
+        );
     }
 
     fn note(&mut self, diagnosis: &Diagnosis, log_odds: f64) {

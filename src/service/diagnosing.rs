@@ -5,6 +5,7 @@
 //! as long as it takes to copy the windows. What it finds lies on the desk for those who ask, and waits at the hub for the one
 //! writer to number, publish and journal it.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -73,8 +74,20 @@ impl Diagnosing {
                 continue;
             }
             desk.show(live.report(seen.windows, true));
-            gate();
-            if live.look(known, &|| stop.is_cancelled()) {
+            // A search that panics is one answer less, and nothing else.
+            let look = AssertUnwindSafe(|| {
+                gate();
+                live.look(known, &|| stop.is_cancelled())
+            });
+            let looked = catch_unwind(look).unwrap_or_else(|_| {
+                tracing::error!(
+                    windows = seen.windows,
+                    "a search failed, by a defect of the program; the next goes on"
+                );
+                live.failed(seen);
+                true
+            });
+            if looked {
                 let report = live.report(seen.windows, false);
                 if report.progress.revision != told_revision {
                     hub.tell(message(&report));

@@ -3,6 +3,7 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, OnceLock};
 use std::time::Instant;
 
@@ -192,6 +193,31 @@ async fn a_search_that_does_not_end_delays_no_window_and_what_came_meanwhile_is_
     held.moved.notify_all();
     let named = running.wait_for_diagnosis("a name", |d| d["verdict"] == "explained").await;
     assert_eq!(named["progress"]["searches"], 2, "the one that was held, and one for all that came since: {named:#}");
+    running.service.drain().await.unwrap();
+}
+
+/// Whatever fails in a search costs that search: it is told and counted, and the next one answers.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_search_that_fails_is_told_and_the_next_one_answers() {
+    let [first, second] = &mission().0;
+    let fails = Arc::new(AtomicBool::new(true));
+    let dir = tempfile::tempdir().unwrap();
+    let mut config = config(&dir);
+    with_case(&mut config);
+    let failing = fails.clone();
+    let gate = move || assert!(!failing.load(Ordering::SeqCst), "a search that fails on purpose");
+    let running = Running { service: Service::start_gated(config, Arc::new(gate)).await.unwrap(), dir };
+    running.send(first).await;
+    let failed = running.wait_for_diagnosis("a failure", |d| d["progress"]["state"] == "failed").await;
+    assert_eq!((&failed["verdict"], &failed["progress"]["searches"]), (&"consistent".into(), &0.into()), "{failed:#}");
+    assert!(failed["progress"]["sentence"].as_str().unwrap().contains("failed"), "{failed:#}");
+    assert!(running.get("/accel").await["clock_s"].as_f64().is_some());
+    fails.store(false, Ordering::SeqCst);
+    running.send(second).await;
+    let named = running.wait_for_diagnosis("a name", |d| d["verdict"] == "explained").await;
+    assert!(named["progress"]["searches_failed"].as_u64() > Some(0), "{named:#}");
+    let metrics = reqwest::get(running.url("/metrics")).await.unwrap().text().await.unwrap();
+    assert!(metrics.contains("oare_diagnosis_searches_failed_total"), "{metrics}");
     running.service.drain().await.unwrap();
 }
 

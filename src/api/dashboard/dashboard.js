@@ -220,6 +220,7 @@ async function refreshDiagnosis() {
   if (p.time_to_detect_s !== null) parts.push(`alarm ${spanText(p.time_to_detect_s)} ${since}`);
   if (p.time_to_name_s !== null) parts.push(`named ${spanText(p.time_to_name_s)} ${since}`);
   if (p.alarms_withdrawn) parts.push(`${p.alarms_withdrawn} alarm(s) withdrawn`);
+  if (p.searches_failed) parts.push(`${p.searches_failed} search(es) failed`);
   if (p.state === "searching") parts.push("a search is under way");
   byId("diagnosis-progress").textContent = parts.join(" · ");
 }
