@@ -24,8 +24,7 @@ pub fn read(material: &Material) -> Result<Case, String> {
     };
     let header = file("case.toml").and_then(|octets| String::from_utf8(octets).ok()).ok_or("there is no case.toml")?;
     let header = Header::parse(&header, &[]).map_err(|e| e.to_string())?;
-    let texts = recorder::texts(&header, file).map_err(|e| e.to_string())?;
-    Case::from_texts(header, &texts).map_err(|e| e.to_string())
+    recorder::case(header, file).map_err(|e| e.to_string())
 }
 
 impl Analyser for Engine {

@@ -141,9 +141,7 @@ pub fn read_case(directory: &Path, set: &[String]) -> Result<Case, CaseError> {
     let toml = file("case.toml")
         .and_then(|octets| String::from_utf8(octets).ok())
         .ok_or_else(|| CaseError::MissingFile { file: directory.join("case.toml").display().to_string() })?;
-    let header = Header::parse(&toml, set)?;
-    let texts = recorder::texts(&header, file)?;
-    Case::from_texts(header, &texts)
+    recorder::case(Header::parse(&toml, set)?, file)
 }
 
 fn print_table(diagnosis: &Diagnosis) {

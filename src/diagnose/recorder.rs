@@ -5,15 +5,13 @@
 //! corrected value is. The covariance of the bias law comes along: what it leaves open is slow and the same in all windows, and no
 //! finding.
 
-use std::fmt::Write;
-
 use nalgebra::DMatrix;
 
-use super::case::{BIAS_ERROR, Header, Recording, Texts};
+use super::case::{Case, Fault, Header, Recording, Texts};
 use super::error::CaseError;
 use super::noise::dot;
 use crate::ingest::wire::{PlaybackPart, PlaybackReader};
-use crate::pipeline::calibration::{Bias, Calibration, bias_law::PARAMETERS};
+use crate::pipeline::calibration::{Anomaly, Bias, Calibration, bias_law::PARAMETERS};
 use crate::pipeline::station::{Station, replay};
 use crate::pipeline::window::Window;
 use crate::pipeline::{PlaybackId, Product, Settings};
@@ -46,6 +44,9 @@ pub fn usable(station: &Station) -> Usable {
             conditions.push((window.centre_s(), window.temperature_c, product.range));
         }
     }
+    let fault =
+        |a: &Anomaly| Fault { kind: a.kind, span_s: [a.from.seconds(), a.to.seconds()], sentence: a.sentence.clone() };
+    found.recording.faults = station.derived().anomalies.iter().map(fault).collect();
     if let Some(calibration) = station.calibration() {
         found.recording.bias_errors_ng = OARE_AXIS.map(|axis| bias_errors(calibration, axis, &conditions));
     }
@@ -103,49 +104,37 @@ fn about_mean(series: &[f64]) -> Vec<f64> {
 /// half a standard deviation.
 const NEGLIGIBLE_NG: f64 = 0.25;
 
-/// The texts of a case whose files somebody has by their names; a dump is taken through the pipeline.
+/// A case whose files somebody has by their names; a dump is taken through the pipeline.
 ///
 /// # Errors
-/// When the recording is of another kind.
-pub fn texts(header: &Header, file: impl Fn(&str) -> Option<Vec<u8>>) -> Result<Texts, CaseError> {
+/// The first file that is missing or wrong; a recording of another kind.
+pub fn case(header: Header, file: impl Fn(&str) -> Option<Vec<u8>>) -> Result<Case, CaseError> {
+    let files = header.files.clone();
     let named = |name: &str| if name.is_empty() { None } else { file(name) };
     let text = |name: &str| named(name).and_then(|octets| String::from_utf8(octets).ok());
-    let files = &header.files;
-    let recording = match header.kind.as_str() {
-        "acceleration_csv" => text(&files.recording),
-        "recorder_dump" => named(&files.recording).map(|dump| recording_csv(&dump, header)),
-        _ => return Err(CaseError::Kind(header.kind.clone())),
-    };
-    Ok(Texts {
-        recording,
+    let texts = Texts {
+        recording: None,
         simulation: text(&files.simulation),
         ancillary: text(&files.ancillary),
         events: text(&files.events),
-    })
+    };
+    match header.kind.as_str() {
+        "acceleration_csv" => Case::from_texts(header, &Texts { recording: text(&files.recording), ..texts }),
+        "recorder_dump" => {
+            let dump = named(&files.recording).ok_or(CaseError::MissingFile { file: files.recording })?;
+            let recording = recorded(&dump, &header);
+            Case::of(header, recording, &texts)
+        }
+        _ => Err(CaseError::Kind(header.kind)),
+    }
 }
 
-/// The windows of a dump in the form of an `acceleration_csv` recording.
-pub fn recording_csv(dump: &[u8], header: &Header) -> String {
+/// The windows of a dump.
+pub fn recorded(dump: &[u8], header: &Header) -> Recording {
     let time = MissionTime { epoch_utc: header.epoch_utc, liftoff_clock_s: header.liftoff_clock_s };
     let settings = Settings { time, ..Settings::sts65() };
     let station = replay(&settings, None, |station| take(station, &settings, dump));
-    let Recording { clock_s, a_ng: [ax, ay, az], dev_ng: [dx, dy, dz], bias_errors_ng } = usable(&station).recording;
-    let mut csv = String::from("clock_s,ax_ng,ay_ng,az_ng,dev_x_ng,dev_y_ng,dev_z_ng");
-    for (axis, errors) in ["x", "y", "z"].iter().zip(&bias_errors_ng) {
-        (0..errors.len()).for_each(|n| {
-            let _ = write!(csv, ",{BIAS_ERROR}{axis}_{n}");
-        });
-    }
-    csv.push('\n');
-    for (i, clock_s) in clock_s.iter().enumerate() {
-        let _ =
-            write!(csv, "{clock_s:.1},{:.3},{:.3},{:.3},{:.3},{:.3},{:.3}", ax[i], ay[i], az[i], dx[i], dy[i], dz[i]);
-        for error in bias_errors_ng.iter().flatten() {
-            let _ = write!(csv, ",{:.3}", error[i]);
-        }
-        csv.push('\n');
-    }
-    csv
+    usable(&station).recording
 }
 
 fn take(station: &mut Station, settings: &Settings, dump: &[u8]) {

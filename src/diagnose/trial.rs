@@ -224,7 +224,8 @@ impl<'a> Trial<'a> {
             log_score_gain_se: (spread * count).sqrt(),
         };
         let whole = self.frame.with_data(&self.signal).data;
-        (held, (predictable >= SHARE * whole.dot(&whole)).then(|| 1.0 - unpredicted / predictable))
+        let is_enough = predictable > 0.0 && predictable >= SHARE * whole.dot(&whole);
+        (held, is_enough.then(|| 1.0 - unpredicted / predictable))
     }
 
     /// The set on a part of the record.

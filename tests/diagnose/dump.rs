@@ -3,6 +3,10 @@
 use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
+use oare_ground::ingest::wire::LinkConfig;
+use oare_ground::simulate::expected::case_files;
+use oare_ground::simulate::recorder::{RecorderConfig, frames};
+use oare_ground::simulate::{Fault, Mission, MissionConfig, playbacks};
 
 fn answer(kind: Kind, seed: u64, only: Option<&'static str>) -> Diagnosis {
     let manner = Manner { dump: true, ..Manner::default() };
@@ -33,4 +37,30 @@ fn sets_that_a_dump_cannot_tell_apart_have_an_observation_that_would() {
     assert_eq!(found.verdict, Verdict::Ambiguous, "{found:?}");
     let observation = found.separating_observation.unwrap();
     assert!(observation.gain.is_some_and(|gain| gain > 0.0), "{observation:?}");
+}
+
+/// Records that name range C while the sensor is in range A, for an hour: the windows are corrected, and the fault is told with its span.
+#[test]
+fn records_that_name_a_wrong_range_are_an_effect_with_their_span() {
+    const SPAN_S: [f64; 2] = [40_000.0, 43_600.0];
+    let mut config = MissionConfig::sts65(5, 12.0);
+    config.faults.push(Fault::RangeMisreport { from_clock_s: SPAN_S[0] as u32, seconds: 3600 });
+    let mission = Mission::new(config).unwrap();
+    let link = LinkConfig::default();
+    let passes = playbacks(&frames(mission.fly(), link), &link, &RecorderConfig::clean(), 5);
+    let mut files: Vec<(String, Vec<u8>)> = case_files(&mission, "wrong-range", "recording.dump")
+        .unwrap()
+        .into_iter()
+        .map(|(name, text)| (name.to_string(), text.into_bytes()))
+        .collect();
+    files.push(("recording.dump".into(), passes.into_iter().flat_map(|pass| pass.octets).collect()));
+    let found = diagnose(&super::case(&files), &Settings::default()).unwrap();
+    let [effect] = &found.effects[..] else { panic!("{found:?}") };
+    assert_eq!((found.verdict, effect.id.as_str()), (Verdict::Explained, "range_misreport"), "{found:?}");
+    for (parameter, truth) in effect.parameters.iter().zip(SPAN_S) {
+        assert!((parameter.value - truth).abs() <= 2.0 * parameter.sigma, "{parameter:?}");
+    }
+    assert!(found.notes.contains(&effect.why), "{:?}", found.notes);
+    let json = serde_json::to_string(&found).unwrap();
+    assert!(!json.contains("\"confirmed\":null"), "what is not known is absent");
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::diagnose::case::Header;
-use crate::diagnose::recorder::recording_csv;
+use crate::diagnose::recorder::recorded;
 use crate::math::rms::rms;
 
 fn column(text: &str, name: &str) -> Vec<f64> {
@@ -102,15 +102,15 @@ fn a_dump_holds_what_the_sensor_felt_at_the_loudness_its_truth_says() {
     assert!(file(&case, "case.toml").contains("kind = \"recorder_dump\""));
     let header = Header::parse(file(&case, "case.toml"), &[]).unwrap();
     let dump = &case.files.iter().find(|(n, _)| n == "recording.dump").unwrap().1;
-    let recording = recording_csv(dump, &header);
+    let recording = recorded(dump, &header);
     // Calibrated from the dump alone; a window differs from the next by its noise, of which they share half the samples.
     for (axis, name) in ["ax_ng", "ay_ng", "az_ng"].into_iter().enumerate() {
-        let (clock, a) = (column(&recording, "clock_s"), column(&recording, name));
+        let (clock, a) = (&recording.clock_s, &recording.a_ng[axis]);
         assert!(clock.len() > 4000, "{}", clock.len());
         let grid = column(file(&case, "simulation.csv"), "clock_s");
         let simulated = column(file(&case, "simulation.csv"), name);
         let left: Vec<f64> =
-            clock.iter().zip(&a).map(|(t, a)| a - effect::at(&simulated, (t - grid[0]) / 20.0)).collect();
+            clock.iter().zip(a).map(|(t, a)| a - effect::at(&simulated, (t - grid[0]) / 20.0)).collect();
         let steps: Vec<f64> = left.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let (found, told) = (rms(&steps), case.truth.noise_ng[axis]);
         // A trimmed mean of normal samples scatters a few parts in a hundred more than a mean; bursts add to it.

@@ -8,9 +8,9 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 pub use header::{Files, Header, Vehicle};
-pub use read::BIAS_ERROR;
 
 use super::error::CaseError;
+use crate::pipeline::calibration::AnomalyKind;
 
 /// Windows a recording must have in common with its simulation, fewer say nothing about the noise.
 pub const WINDOWS_MIN: usize = 200;
@@ -43,6 +43,19 @@ pub struct Recording {
     pub dev_ng: [Vec<f64>; 3],
     /// What the calibration leaves open, per axis: series whose true sizes are independent and standard normal, ng.
     pub bias_errors_ng: [Vec<Vec<f64>>; 3],
+    /// What was wrong with the instrument, as far as its own dump tells.
+    pub faults: Vec<Fault>,
+}
+
+/// A fault of the instrument that the calibration found in a dump.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fault {
+    /// Which.
+    pub kind: AnomalyKind,
+    /// When, instrument clock.
+    pub span_s: [f64; 2],
+    /// One sentence an operator understands.
+    pub sentence: String,
 }
 
 /// What the baseline simulation expects, instantaneous.
@@ -169,6 +182,15 @@ impl Case {
     pub fn from_texts(header: Header, texts: &Texts) -> Result<Self, CaseError> {
         let name = header.files.recording.clone();
         let recording = read::recording(&name, read::given(&name, &texts.recording)?)?;
+        Self::of(header, recording, texts)
+    }
+
+    /// From a recording that has been read, and the texts of the other files.
+    ///
+    /// # Errors
+    /// The first that is wrong; a recording of too few windows.
+    pub fn of(header: Header, recording: Recording, texts: &Texts) -> Result<Self, CaseError> {
+        read::increasing(&header.files.recording, &recording.clock_s, WINDOWS_MIN)?;
         let expected = Expectation::from_texts(header, texts).map_err(first)?;
         Self::meet(Arc::new(expected), recording)
     }
@@ -241,6 +263,7 @@ fn take(recording: &Recording, keep: &[usize]) -> Recording {
         a_ng: std::array::from_fn(|k| pick(&recording.a_ng[k])),
         dev_ng: std::array::from_fn(|k| pick(&recording.dev_ng[k])),
         bias_errors_ng: recording.bias_errors_ng.each_ref().map(|axis| axis.iter().map(pick).collect()),
+        faults: recording.faults.clone(),
     }
 }
 

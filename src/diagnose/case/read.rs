@@ -51,7 +51,8 @@ fn columns(file: &str, text: &str, names: &[&str]) -> Result<Vec<Vec<f64>>, Case
     Ok(out)
 }
 
-fn increasing(file: &str, clock_s: &[f64], needed: usize) -> Result<(), CaseError> {
+/// Times that are enough and increase.
+pub fn increasing(file: &str, clock_s: &[f64], needed: usize) -> Result<(), CaseError> {
     if clock_s.len() < needed {
         return Err(CaseError::TooFew { file: file.into(), found: clock_s.len(), needed });
     }
@@ -63,29 +64,12 @@ fn increasing(file: &str, clock_s: &[f64], needed: usize) -> Result<(), CaseErro
     }
 }
 
-/// What the columns of a recording begin with that say what its calibration leaves open; axis and number follow.
-pub const BIAS_ERROR: &str = "bias_error_ng_";
-
 /// Windows of a recording.
 pub fn recording(file: &str, text: &str) -> Result<Recording, CaseError> {
     let [clock_s, ax, ay, az, dx, dy, dz] =
         fixed(columns(file, text, &["clock_s", "ax_ng", "ay_ng", "az_ng", "dev_x_ng", "dev_y_ng", "dev_z_ng"])?);
     increasing(file, &clock_s, WINDOWS_MIN)?;
-    let mut bias_errors_ng: [Vec<Vec<f64>>; 3] = Default::default();
-    for (axis, errors) in ["x", "y", "z"].iter().zip(&mut bias_errors_ng) {
-        let own = format!("{BIAS_ERROR}{axis}_");
-        let names: Vec<String> = text
-            .lines()
-            .next()
-            .unwrap_or("")
-            .split(',')
-            .map(str::trim)
-            .filter(|n| n.starts_with(&own))
-            .map(str::to_string)
-            .collect();
-        *errors = columns(file, text, &names.iter().map(String::as_str).collect::<Vec<&str>>())?;
-    }
-    Ok(Recording { clock_s, a_ng: [ax, ay, az], dev_ng: [dx, dy, dz], bias_errors_ng })
+    Ok(Recording { clock_s, a_ng: [ax, ay, az], dev_ng: [dx, dy, dz], ..Recording::default() })
 }
 
 /// What a simulation expects.

@@ -2,6 +2,7 @@
 //! it says of a decision is in the files beside it.
 
 mod credible;
+mod faults;
 mod fit;
 mod imitators;
 mod judge;
@@ -75,6 +76,18 @@ fn effect_of(entries: &[Entry], set: &Set, i: usize) -> Option<&'static Effect> 
 
 /// The answer, the claimed series at the windows, and the ladder of evidence.
 pub fn conclude(
+    scene: &Scene,
+    library: &Library,
+    solution: &Solution,
+    proof: Proof,
+) -> (Diagnosis, Axes, Vec<(String, f64)>) {
+    let (mut answer, signal, ladder) = of_the_mismatch(scene, library, solution, proof);
+    faults::tell(&mut answer, scene);
+    (answer, signal, ladder)
+}
+
+/// The same without the faults of the instrument.
+fn of_the_mismatch(
     scene: &Scene,
     library: &Library,
     solution: &Solution,

@@ -46,7 +46,7 @@ impl AnomalyKind {
 }
 
 /// False anomalies that chance may tell, per mission, over all kinds.
-const FALSE_PER_MISSION: f64 = 1e-3;
+pub const FALSE_PER_MISSION: f64 = 1e-3;
 /// Kinds that share them: all but the estimator, which is compared bit for bit.
 const KINDS: f64 = 8.0;
 

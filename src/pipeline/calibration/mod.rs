@@ -24,7 +24,7 @@ mod version;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-pub use anomaly::{Anomaly, AnomalyKind, RangeCorrection};
+pub use anomaly::{Anomaly, AnomalyKind, FALSE_PER_MISSION, RangeCorrection};
 pub use apply::{Bias, BiasLaw, Calibrated, Calibration, Measured, Provenance, Scale};
 pub use known::{KnownCalibration, KnownCalibrationError};
 pub use two_position::BiasMeasurement;
