@@ -9,8 +9,8 @@ use crate::diagnose::search::Weighed;
 use crate::diagnose::solve::{Library, Solution};
 use crate::diagnose::trial::Tried;
 
-/// Log odds by which an open form must beat the best listed set.
-const OPEN_MARGIN: f64 = 3.0;
+/// Log odds by which a set that cannot be believed must be above all that can, for those to be no explanation.
+const REFUSED_MARGIN: f64 = 3.0;
 /// A finding that fails its trial is still a mismatch when noise makes its evidence this much more rarely than a claim asks.
 const BEYOND_DOUBT: f64 = 0.05;
 
@@ -40,15 +40,15 @@ pub fn judge<'a>(
     let null = solution.null.log_posterior;
     let [top, best, open] =
         [listed.first().copied(), solution.listed.first(), solution.open.first()].map(|w| (height(w), w));
-    let refused = best.0 - top.0 > OPEN_MARGIN;
-    let open_wins = open.0 - top.0.max(null) > OPEN_MARGIN;
+    let refused = best.0 - top.0 > REFUSED_MARGIN;
+    // The prior of the open forms has made them pay already.
+    let open_wins = open.0 > top.0.max(null);
     let claimed = probability <= EVIDENCE_SHARE * claim && best.0.max(open.0) > null;
     let (verdict, chosen) = match (claimed, open_wins, refused) {
         (false, _, _) => (Verdict::Consistent, None),
         (true, true, _) => (Verdict::Unexplained, open.1),
         (true, false, true) => (Verdict::Unexplained, best.1),
-        // Nothing listed at all, and an open form just above nothing.
-        (true, false, false) if listed.is_empty() => (Verdict::Unexplained, open.1),
+        // Not refused: there is one that can be believed.
         (true, false, false) => (Verdict::Explained, Some(simplest(listed))),
     };
     let on_trial = chosen.map(|weighed| (weighed, tried(scene, library, weighed)));
