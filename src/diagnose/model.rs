@@ -28,8 +28,6 @@ pub struct MemberFit {
     pub parameters: Vec<Fitted>,
     /// The axis of a scale factor.
     pub axis: Option<String>,
-    /// Coefficients that are larger than credible: name, value, limit.
-    pub incredible: Vec<(&'static str, f64, f64)>,
 }
 
 /// Parameters of every member, the errors multiplied by `inflation`.
@@ -82,16 +80,12 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
             });
         }
         for (k, l) in effect.linear.iter().enumerate().take(m.linear()) {
-            let value = mean[next + k];
             fit.parameters.push(Fitted {
                 name: l.name,
-                value,
+                value: mean[next + k],
                 sigma: joint[(next + k, next + k)].max(0.0).sqrt() * inflation,
                 unit: l.unit,
             });
-            if value.abs() > l.size_max {
-                fit.incredible.push((l.name, value, l.size_max));
-            }
         }
         next += m.linear();
         out.push(fit);

@@ -226,6 +226,16 @@ impl Set {
         }
     }
 
+    /// The same with every prior size so many times the usual one.
+    pub fn with_prior_sizes(&self, scale: f64) -> Self {
+        let mut other = self.clone();
+        for m in other.members.iter_mut().filter(|m| !m.point.fixed) {
+            m.point.columns = m.point.columns.iter().map(|column| column.times(scale / m.scale)).collect();
+            m.scale = scale;
+        }
+        other
+    }
+
     /// Mean and covariance of all linear coefficients in their own units, members in order.
     pub fn coefficients(&self, frame: &Frame, entries: &[Entry]) -> (DVector<f64>, DMatrix<f64>) {
         let sizes: Vec<f64> = self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| m.sizes(entries)).collect();

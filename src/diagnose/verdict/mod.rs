@@ -36,6 +36,10 @@ const EVIDENCE_SHARE: f64 = 0.8;
 /// What remains overturns an explanation when it has more than this share of the energy explained.
 const REMAINS_SHARE: f64 = 0.03;
 
+/// Prior sizes are for weighing hypotheses. In what is told of a size they are so many times the usual, or they would draw one that is
+/// several times the usual towards it by a standard error; and bound only what the record cannot say at all.
+const TOLD: f64 = 3.0;
+
 /// What proof there is, and what is asked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Proof {
@@ -126,8 +130,9 @@ fn of_the_mismatch(
     };
     let (frame, set) = weighed.framed(scene, &library.entries);
     let (fit, inflation) = fit(scene, library, &frame, weighed, &set, tried, &mut notes);
-    let fits = model::parameters(scene, &frame, &library.entries, &set, inflation);
-    let contributions = set.contributions(scene, &frame, &library.entries);
+    let told = set.with_prior_sizes(TOLD);
+    let fits = model::parameters(scene, &frame, &library.entries, &told, inflation);
+    let contributions = told.contributions(scene, &frame, &library.entries);
     let best = Best { weighed, frame, set, fits, contributions };
     answer.fit = Some(fit);
     let signal = sum(scene, &best.contributions);
