@@ -27,7 +27,10 @@ fn a_bias_fitted_two_standard_errors_off_is_no_finding() {
 fn an_acceleration_in_a_dump_is_named_and_sized() {
     let found = answer(Kind::One, 1001, Some("cg_offset"));
     assert_eq!((found.verdict, found.effects[0].id.as_str()), (Verdict::Explained, "cg_offset"), "{found:?}");
-    assert!(found.effects[0].parameters.iter().all(|p| p.sigma > 0.0 && p.sigma < 0.2), "{found:?}");
+    // Along y the tensor of these attitudes says little.
+    for (parameter, most) in found.effects[0].parameters.iter().zip([0.05, 0.5, 0.05]) {
+        assert!(parameter.sigma > 0.0 && parameter.sigma < most, "{parameter:?}");
+    }
 }
 
 /// What the calibration leaves open goes on into an observation to come.
