@@ -53,16 +53,12 @@ pub fn event_needed(id: &str) -> Option<&'static str> {
 
 /// Whether the effect accelerates the vehicle; the others are the sensor's.
 pub fn is_acceleration(id: &str) -> bool {
-    const SENSOR: [&str; 7] = [
-        "magnetic_sensitivity",
-        "scale_factor",
-        "misalignment",
-        "temperature_bias",
-        "bias_drift",
-        "bias_step",
-        "time_offset",
-    ];
-    !SENSOR.contains(&id)
+    !is_instrumental(id) && !matches!(id, "magnetic_sensitivity" | "temperature_bias" | "bias_drift" | "bias_step")
+}
+
+/// Whether the effect works on whatever else the sensor feels.
+fn is_instrumental(id: &str) -> bool {
+    matches!(id, "scale_factor" | "misalignment" | "time_offset")
 }
 
 /// The parts of the signal before anything is left out, on the 5 s grid.
@@ -188,7 +184,7 @@ impl Drawn {
 
     /// Whether it acts in the instrument, on everything the sensor feels.
     pub fn is_instrumental(&self) -> bool {
-        matches!(self.id, "scale_factor" | "misalignment" | "time_offset")
+        is_instrumental(self.id)
     }
 
     /// Whether the effect can be smaller or larger.
@@ -307,7 +303,8 @@ pub fn at(series: &[f64], place: f64) -> f64 {
     series[k] + (series[k + 1] - series[k]) * (place - k as f64)
 }
 
-fn at_vector(series: &[Vector3<f64>], place: f64) -> Vector3<f64> {
+/// The same of vectors.
+pub fn at_vector(series: &[Vector3<f64>], place: f64) -> Vector3<f64> {
     let place = place.clamp(0.0, (series.len() - 1) as f64);
     let k = (place as usize).min(series.len() - 2);
     series[k] + (series[k + 1] - series[k]) * (place - k as f64)

@@ -253,8 +253,8 @@ impl Question {
         let lacks_bulge = self.parts.iter().any(|(id, _, _)| id == "diurnal_bulge");
         let density_kg_m3 = record::simulated_density(&self.flight, lacks_bulge);
         let recording = match &self.tape {
-            Some(tape) => tape.recording(rng, &self.flight, &self.felt, &self.noise, &self.kept),
-            None => record::windows(rng, &self.flight, &self.felt, &self.noise, &self.kept),
+            Some(tape) => tape.recording(rng, &self),
+            None => record::windows(rng, &self),
         };
         let noise_ng = recording.noise_ng;
         let files = record::files(&id, &self.flight, recording, &self.signal.simulated, &density_kg_m3);
@@ -294,13 +294,10 @@ fn ids(rng: &mut ChaCha12Rng, order: &Order) -> Vec<&'static str> {
         Kind::Two => 2,
         Kind::One | Kind::Single | Kind::Deleted => 1,
     };
-    let list: Vec<&'static str> = match order.kind {
-        Kind::Single => IMITATED.to_vec(),
-        _ => effect::IDS.to_vec(),
-    };
+    let all = if order.kind == Kind::Single { &IMITATED[..] } else { &effect::IDS[..] };
     // A calibration is there to take an instrument's own errors away: what a dump conceals is an acceleration.
     let list: Vec<&'static str> =
-        list.into_iter().filter(|id| !order.manner.dump || effect::is_acceleration(id)).collect();
+        all.iter().copied().filter(|id| !order.manner.dump || effect::is_acceleration(id)).collect();
     let mut ids: Vec<&'static str> = order.only.into_iter().filter(|id| effect::IDS.contains(id)).collect();
     while ids.len() < count {
         let id = *pick(rng, &list);

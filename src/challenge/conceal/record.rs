@@ -7,8 +7,8 @@ use rand_chacha::ChaCha12Rng;
 
 use super::draw::{between, log_between, normal, pick};
 use super::flight::{FILE_STRIDE, Flight, LENGTH_S, MARGIN_S, STEP_S};
-use super::force;
 use super::noise::Noise;
+use super::{Question, force};
 use crate::diagnose::case::WINDOW_STRIDE_S;
 use crate::math::rms::rms_about_mean;
 
@@ -76,13 +76,8 @@ pub struct Recording {
 }
 
 /// What the sensor feels as calibrated windows, with noise and a constant that a bias fit would leave.
-pub fn windows(
-    rng: &mut ChaCha12Rng,
-    flight: &Flight,
-    felt: &[Vector3<f64>],
-    noise: &Noise,
-    kept: &[bool],
-) -> Recording {
+pub fn windows(rng: &mut ChaCha12Rng, question: &Question) -> Recording {
+    let Question { flight, felt, noise, kept, .. } = question;
     let awake = awake(flight);
     let means = window_means(flight, felt);
     let drawn: [Vec<f64>; 3] = std::array::from_fn(|axis| noise.series(rng, axis, &awake));

@@ -4,10 +4,10 @@
 use nalgebra::Vector3;
 use rand_chacha::ChaCha12Rng;
 
-use super::effect;
 use super::flight::{Flight, LENGTH_S, STEP_S};
 use super::noise::Noise;
 use super::record::{Recording, awake, centres_s, kept_of};
+use super::{Question, effect};
 use crate::diagnose::case::{HALF_WINDOW_S, WINDOW_STRIDE_S};
 use crate::ingest::wire::LinkConfig;
 use crate::math::rms::rms;
@@ -34,9 +34,7 @@ struct Felt<'a> {
 
 impl QuasiSteady for Felt<'_> {
     fn quasi_steady_ng(&self, clock_s: f64) -> Vector3<f64> {
-        let position = ((clock_s - self.first_s) / STEP_S).clamp(0.0, (self.ng.len() - 2) as f64);
-        let k = position as usize;
-        self.ng[k] + (self.ng[k + 1] - self.ng[k]) * (position - k as f64)
+        effect::at_vector(self.ng, (clock_s - self.first_s) / STEP_S)
     }
 }
 
@@ -84,15 +82,9 @@ impl Tape {
         centres_s(flight).into_iter().map(|t| !busy(t)).collect()
     }
 
-    /// The dump.
-    pub fn recording(
-        &self,
-        rng: &mut ChaCha12Rng,
-        flight: &Flight,
-        felt: &[Vector3<f64>],
-        noise: &Noise,
-        kept: &[bool],
-    ) -> Recording {
+    /// The dump of a question's flight.
+    pub fn recording(&self, rng: &mut ChaCha12Rng, question: &Question) -> Recording {
+        let Question { flight, felt, noise, kept, .. } = question;
         let windows = (flight.times_s.len() as f64 * STEP_S / WINDOW_STRIDE_S) as usize + 2;
         let slow: [Vec<f64>; 3] = std::array::from_fn(|axis| noise.slow_series(rng, axis, windows));
         let slow_at =

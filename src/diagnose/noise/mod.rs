@@ -82,6 +82,7 @@ impl Schedule {
 
     /// The same with errors that all windows share.
     pub fn with_shared(self, shared_ng: [Vec<Vec<f64>>; 3]) -> Self {
+        debug_assert!(shared_ng.iter().flatten().all(|series| series.len() == self.len()), "a value for every window");
         Self { shared_ng, ..self }
     }
 
