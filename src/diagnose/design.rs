@@ -1,9 +1,9 @@
 //! Whitened columns and the evidence of a set of them.
 //!
-//! Given the noise everything is linear: d = X b + c + n, with b ~ N(0, prior), a constant c per axis without prior, and
+//! Given the noise everything is linear: d = X b + c + n, with b ~ N(m, prior), a constant c per axis without prior, and
 //! n whitened. The log evidence ratio of X against nothing is then
-//! 1/2 y' (A + I)^-1 y - 1/2 log det (A + I), A = X'X and y = X'd, the columns scaled by their prior size (Kennedy and
-//! O'Hagan 2001 for why sizes need priors). Not here: what the columns mean.
+//! 1/2 (y + m)' (A + I)^-1 (y + m) - 1/2 m'm - 1/2 log det (A + I), A = X'X and y = X'd, the columns scaled by their prior
+//! size (Kennedy and O'Hagan 2001 for why sizes need priors). Not here: what the columns mean.
 
 use std::sync::Arc;
 
@@ -30,6 +30,8 @@ struct Part {
 #[derive(Debug, Clone, Default)]
 pub struct Column {
     parts: [Option<Part>; 3],
+    /// Mean of the prior of its coefficient, in prior sizes.
+    mean: f64,
 }
 
 impl Column {
@@ -55,7 +57,13 @@ impl Column {
     pub fn times(&self, factor: f64) -> Column {
         let mut out = self.clone();
         out.parts.iter_mut().flatten().for_each(|part| part.factor *= factor);
+        out.mean /= factor;
         out
+    }
+
+    /// The same about another prior mean, in prior sizes.
+    pub fn about(self, mean: f64) -> Column {
+        Column { mean, ..self }
     }
 
     /// This column less another times `factor`.
@@ -280,6 +288,8 @@ fn shared_errors(whitener: &Whitener, one: &[f64], shared_ng: &[Vec<f64>]) -> (V
 pub struct Normal {
     a: DMatrix<f64>,
     y: DVector<f64>,
+    /// Prior means, in prior sizes.
+    mean: DVector<f64>,
 }
 
 /// Inverse square of how much wider a prior is taken where it must not decide: six times.
@@ -292,9 +302,11 @@ impl Normal {
         let a = &self.a * (scale * scale) + DMatrix::identity(n, n);
         match Cholesky::new(a) {
             Some(c) => {
-                let y = &self.y * scale;
+                let mean = &self.mean / scale;
+                let y = &self.y * scale + &mean;
                 let half = c.l_dirty().solve_lower_triangular(&y).unwrap_or_else(|| DVector::zeros(n));
-                0.5 * half.norm_squared() - (0..n).map(|i| c.l_dirty()[(i, i)].ln()).sum::<f64>()
+                let volume = (0..n).map(|i| c.l_dirty()[(i, i)].ln()).sum::<f64>();
+                0.5 * (half.norm_squared() - mean.norm_squared()) - volume
             }
             None => f64::NEG_INFINITY,
         }
@@ -302,7 +314,7 @@ impl Normal {
 
     /// The normal equations of the same columns over this part of a record and another.
     pub fn and(&self, other: &Normal) -> Normal {
-        Normal { a: &self.a + &other.a, y: &self.y + &other.y }
+        Normal { a: &self.a + &other.a, y: &self.y + &other.y, mean: self.mean.clone() }
     }
 
     /// What the columns explain at most, their sizes free: half the chi square.
@@ -321,7 +333,8 @@ impl Normal {
     /// Posterior mean of the sizes in units of their priors.
     pub fn posterior_mean(&self) -> DVector<f64> {
         let n = self.y.len();
-        Cholesky::new(&self.a + DMatrix::identity(n, n)).map_or_else(|| DVector::zeros(n), |c| c.solve(&self.y))
+        Cholesky::new(&self.a + DMatrix::identity(n, n))
+            .map_or_else(|| DVector::zeros(n), |c| c.solve(&(&self.y + &self.mean)))
     }
 
     /// Whitened energy that a prediction from this part of a record is expected to miss of the series fitted to all of it, in the
@@ -342,7 +355,8 @@ impl Normal {
     /// Log evidence gained by column `i` alone.
     pub fn gain_of(&self, i: usize, scale: f64) -> f64 {
         let one_more = scale * scale * self.a[(i, i)] + 1.0;
-        0.5 * (scale * self.y[i]).powi(2) / one_more - 0.5 * one_more.ln()
+        let mean = self.mean[i] / scale;
+        0.5 * ((scale * self.y[i] + mean).powi(2) / one_more - mean * mean - one_more.ln())
     }
 }
 
@@ -359,6 +373,17 @@ pub struct Chosen<'a> {
 impl<'a> Chosen<'a> {
     /// Choose linear columns and columns of fixed amplitude one.
     pub fn new(frame: &Frame, columns: Vec<&'a Column>, fixed: &[&Column]) -> Self {
+        let means = columns.iter().map(|c| c.mean).collect();
+        Self::about(frame, columns, means, fixed)
+    }
+
+    /// Choose linear columns, all prior means zero.
+    pub fn about_nothing(frame: &Frame, columns: Vec<&'a Column>) -> Self {
+        let means = vec![0.0; columns.len()];
+        Self::about(frame, columns, means, &[])
+    }
+
+    fn about(frame: &Frame, columns: Vec<&'a Column>, means: Vec<f64>, fixed: &[&Column]) -> Self {
         let mut data = frame.data.clone();
         for column in fixed {
             data = data.less(column, 1.0);
@@ -379,7 +404,7 @@ impl<'a> Chosen<'a> {
                 }
             }
         }
-        let y = DVector::from_iterator(n, columns.iter().map(|c| c.dot(&data)));
+        let y = DVector::from_iterator(n, columns.iter().zip(&means).map(|(c, mean)| c.dot(&data) + mean));
         // A + I is positive definite but for rounding: a jitter of its size keeps a column of zeros harmless.
         let cholesky = Cholesky::new(a.clone()).or_else(|| {
             let jitter = 1e-10 * a.diagonal().max();
@@ -389,7 +414,9 @@ impl<'a> Chosen<'a> {
             return Self { columns, data, cholesky: None, reduced: DVector::zeros(0), log_evidence: f64::NEG_INFINITY };
         };
         let reduced = cholesky.l_dirty().solve_lower_triangular(&y).unwrap_or_else(|| DVector::zeros(n));
-        log_evidence += 0.5 * reduced.norm_squared() - (0..n).map(|i| cholesky.l_dirty()[(i, i)].ln()).sum::<f64>();
+        let means: f64 = means.iter().map(|mean| mean * mean).sum();
+        let volume = (0..n).map(|i| cholesky.l_dirty()[(i, i)].ln()).sum::<f64>();
+        log_evidence += 0.5 * (reduced.norm_squared() - means) - volume;
         Self { columns, data, cholesky: Some(cholesky), reduced, log_evidence }
     }
 
@@ -421,7 +448,8 @@ impl<'a> Chosen<'a> {
                 a[(j, i)] = a[(i, j)];
             }
         }
-        Normal { a, y }
+        let mean = DVector::from_iterator(n, columns.iter().map(|c| c.mean));
+        Normal { a, y, mean }
     }
 
     /// Log evidence gained by adding a column of fixed amplitude one.

@@ -90,7 +90,7 @@ impl<'a> Trial<'a> {
             let Some(raws) = entry_columns(scene, &entries[m.entry], &m.theta) else { continue };
             for j in 0..m.linear().max(1) {
                 let place = m.axis.unwrap_or(j);
-                let size = (m.linear() > 0).then(|| m.scale * entries[m.entry].sizes[place]);
+                let size = (m.linear() > 0).then(|| m.scale * entries[m.entry].usual_size(place));
                 series.push((raws[place].clone(), size));
             }
         }
@@ -134,14 +134,16 @@ impl<'a> Trial<'a> {
     fn above_placebo(&self) -> Option<f64> {
         let on_signal = self.frame.with_data(&self.signal);
         let energy = on_signal.data.dot(&on_signal.data);
-        let own = self.set.chosen(self.frame).log_evidence;
         let n = self.scene.schedule.len();
+        let evidence = |linear: &[Column], fixed: &[Column]| {
+            Chosen::new(self.frame, linear.iter().collect(), &fixed.iter().collect::<Vec<&Column>>()).log_evidence
+        };
+        let (linear, fixed) = self.shifted(0);
+        let own = evidence(&linear, &fixed);
         let placebo = |share: &f64| {
             let (linear, fixed) = self.shifted((share * n as f64) as usize);
             let imitated = 2.0 * Chosen::new(&on_signal, Vec::new(), &[]).normal(&linear).explained();
-            let fixed: Vec<&Column> = fixed.iter().collect();
-            let evidence = Chosen::new(self.frame, linear.iter().collect(), &fixed).log_evidence;
-            (imitated < PLACEBO_SHARE * energy).then_some(own - evidence)
+            (imitated < PLACEBO_SHARE * energy).then(|| own - evidence(&linear, &fixed))
         };
         SHIFTS.iter().filter_map(placebo).reduce(f64::min)
     }

@@ -93,18 +93,35 @@ pub struct Linear {
     pub name: &'static str,
     /// Unit.
     pub unit: &'static str,
-    /// Standard deviation of its prior.
+    /// Its usual size.
     pub size: f64,
     /// A value beyond this is not credible, whatever the fit.
     pub size_max: f64,
-    /// The simulation lacks the whole term or nothing of it: only a value about one is credible.
+    /// The simulation lacks the whole term or nothing of it: the prior is about one, and only a value about one is credible.
     pub whole: bool,
 }
+
+/// What is believed of a linear coefficient beforehand, if its effect is there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prior {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub size: f64,
+}
+
+/// What a term's own model (density, attitude, offset) may be off by where the whole of it is missing.
+const WHOLE_SIZE: f64 = 0.1;
 
 /// Fractions at which the whole of a term is missing, given what its own model may be off by.
 const WHOLE: [f64; 2] = [0.4, 1.6];
 
 impl Linear {
+    /// Its prior.
+    pub fn prior(&self) -> Prior {
+        if self.whole { Prior { mean: 1.0, size: WHOLE_SIZE } } else { Prior { mean: 0.0, size: self.size } }
+    }
+
     /// Why a size cannot be believed, if it cannot; `doubt` is what it may be out by.
     pub fn refuses(&self, value: f64, doubt: f64) -> Option<String> {
         if value.abs() > self.size_max {

@@ -58,6 +58,8 @@ pub struct Entry {
     pub points: Vec<(Theta, Shape)>,
     /// Prior sizes of the coefficients.
     pub sizes: Vec<f64>,
+    /// Prior means of the coefficients, in their own units.
+    pub means: Vec<f64>,
 }
 
 impl Entry {
@@ -72,7 +74,8 @@ impl Entry {
             log_prior: LOG_PRIOR,
             log_volume: (effect.log_volume)(scene),
             points,
-            sizes: effect.linear.iter().map(|l| l.size).collect(),
+            sizes: effect.linear.iter().map(|l| l.prior().size).collect(),
+            means: effect.linear.iter().map(|l| l.prior().mean).collect(),
         })
     }
 
@@ -89,6 +92,7 @@ impl Entry {
             log_volume: 0.0,
             points: shapes.into_iter().enumerate().map(|(i, shape)| ([i as f64, 0.0], shape)).collect(),
             sizes,
+            means: vec![0.0; count],
         }
     }
 
@@ -98,6 +102,11 @@ impl Entry {
             Family::Listed(effect) if effect.linear.is_empty() || effect.linear.iter().any(|l| l.whole) => &[1.0],
             _ => &[1.0, SMALL],
         }
+    }
+
+    /// Usual size of coefficient `k` where nothing is believed of it beforehand.
+    pub fn usual_size(&self, k: usize) -> f64 {
+        self.effect().and_then(|effect| effect.linear.get(k)).map_or_else(|| self.sizes[k], |l| l.size)
     }
 
     fn effect(&self) -> Option<&'static Effect> {
@@ -124,31 +133,42 @@ pub struct Bank<'a> {
 }
 
 /// Shapes at their points, whitened all at once.
-fn whiten_all(frame: &Frame, points: &[(Theta, &Shape, &[f64])]) -> Vec<Whitened> {
-    let shapes: Vec<Vec<Vec<OnAxis>>> = points.iter().map(|(_, shape, sizes)| shape.on_axes(sizes, 1.0)).collect();
+fn whiten_all(frame: &Frame, points: &[(Theta, &Shape, &Entry)]) -> Vec<Whitened> {
+    let shapes: Vec<Vec<Vec<OnAxis>>> =
+        points.iter().map(|(_, shape, entry)| shape.on_axes(&entry.sizes, 1.0)).collect();
     let counts: Vec<usize> = shapes.iter().map(Vec::len).collect();
     let mut columns = frame.columns(&shapes.into_iter().flatten().collect::<Vec<Vec<OnAxis>>>()).into_iter();
-    let whitened = |((theta, shape, _), count): (&(Theta, &Shape, &[f64]), usize)| Whitened {
-        theta: *theta,
-        columns: columns.by_ref().take(count).collect(),
-        fixed: matches!(shape, Shape::Fixed(_)),
+    let whitened = |((theta, shape, entry), count): (&(Theta, &Shape, &Entry), usize)| {
+        Whitened::new(*theta, shape, columns.by_ref().take(count).collect(), entry, 1.0)
     };
     points.iter().zip(counts).map(whitened).collect()
 }
 
-fn whiten(frame: &Frame, theta: Theta, shape: &Shape, sizes: &[f64], scale: f64) -> Whitened {
+fn whiten(frame: &Frame, theta: Theta, shape: &Shape, entry: &Entry, scale: f64) -> Whitened {
     let columns = match shape {
-        Shape::Columns(raws) => raws.iter().zip(sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect(),
-        Shape::Scalar(_) | Shape::Fixed(_) => frame.columns(&shape.on_axes(sizes, scale)),
+        Shape::Columns(raws) => {
+            raws.iter().zip(&entry.sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect()
+        }
+        Shape::Scalar(_) | Shape::Fixed(_) => frame.columns(&shape.on_axes(&entry.sizes, scale)),
     };
-    Whitened { theta, columns, fixed: matches!(shape, Shape::Fixed(_)) }
+    Whitened::new(theta, shape, columns, entry, scale)
+}
+
+impl Whitened {
+    fn new(theta: Theta, shape: &Shape, columns: Vec<Column>, entry: &Entry, scale: f64) -> Self {
+        let fixed = matches!(shape, Shape::Fixed(_));
+        let priors = entry.means.iter().zip(&entry.sizes).map(|(mean, size)| mean / (scale * size));
+        let columns =
+            if fixed { columns } else { columns.into_iter().zip(priors).map(|(c, mean)| c.about(mean)).collect() };
+        Self { theta, columns, fixed }
+    }
 }
 
 impl<'a> Bank<'a> {
     /// Whiten all.
     pub fn new(frame: &Frame, entries: &'a [Entry]) -> Self {
-        let points: Vec<(Theta, &Shape, &[f64])> =
-            entries.iter().flat_map(|e| e.points.iter().map(|(theta, shape)| (*theta, shape, &*e.sizes))).collect();
+        let points: Vec<(Theta, &Shape, &Entry)> =
+            entries.iter().flat_map(|e| e.points.iter().map(move |(theta, shape)| (*theta, shape, e))).collect();
         let mut whitened = whiten_all(frame, &points).into_iter();
         let points = entries.iter().map(|e| whitened.by_ref().take(e.points.len()).collect()).collect();
         Self { entries, points }
@@ -198,10 +218,10 @@ impl Set {
         Chosen::new(frame, linear, &fixed)
     }
 
-    /// The linear columns alone chosen, whatever the data of the frame.
-    pub fn chosen_free(&self, frame: &Frame) -> Chosen<'_> {
+    /// The linear columns alone chosen, beside data in which they are expected to be nothing.
+    pub fn chosen_about_nothing(&self, frame: &Frame) -> Chosen<'_> {
         let linear = self.members.iter().filter(|m| !m.point.fixed).flat_map(|m| &m.point.columns).collect();
-        Chosen::new(frame, linear, &[])
+        Chosen::about_nothing(frame, linear)
     }
 
     /// The set without one of its members.
@@ -295,8 +315,8 @@ fn shape_at(scene: &Scene, entry: &Entry, theta: &Theta) -> Option<Shape> {
 fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, m: &Member, theta: &Theta) -> Option<Whitened> {
     let known = entry.points.iter().find(|(t, _)| t == theta);
     let mut point = match known {
-        Some((_, shape)) => whiten(frame, *theta, shape, &entry.sizes, m.scale),
-        None => whiten(frame, *theta, &shape_at(scene, entry, theta)?, &entry.sizes, m.scale),
+        Some((_, shape)) => whiten(frame, *theta, shape, entry, m.scale),
+        None => whiten(frame, *theta, &shape_at(scene, entry, theta)?, entry, m.scale),
     };
     if let Some(axis) = m.axis {
         point.columns = vec![point.columns.swap_remove(axis)];

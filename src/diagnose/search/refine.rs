@@ -23,7 +23,7 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         let scale = set.members[i].scale;
         let gain = |theta: &Theta| -> f64 {
             let Some(shape) = (effect.signature)(scene, theta) else { return f64::NEG_INFINITY };
-            let point = whiten(frame, *theta, &shape, &entry.sizes, scale);
+            let point = whiten(frame, *theta, &shape, entry, scale);
             if point.fixed { chosen.gain_fixed(&point.columns[0]) } else { chosen.gain(&point.columns) }
         };
         let start: Vec<f64> = free.iter().map(|j| theta[*j]).collect();

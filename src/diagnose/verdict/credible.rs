@@ -5,8 +5,8 @@ use crate::diagnose::scene::Scene;
 use crate::diagnose::search::{Set, Weighed};
 use crate::diagnose::solve::Library;
 
-/// Log odds within which another set is as good, and the smaller of two nested sets is preferred.
-pub const EQUAL: f64 = 2.3;
+/// Log odds (of twenty) within which another set is as good, and the smaller of two nested sets is preferred.
+pub const EQUAL: f64 = 3.0;
 
 /// Listed sets whose sizes can be believed; the others are refused, with the reason.
 pub fn credible<'a>(

@@ -11,7 +11,7 @@ use crate::diagnose::solve::Library;
 /// SNR left at which two effects are the same to a record: the data then prefer the wrong one in one record of fifteen.
 const SAME_SNR: f64 = 3.0;
 
-/// The best set with one member taken for its imitator, for every member and every imitator.
+/// The best set with one member taken for its imitator, for every imitator of every member that is loud enough for it to matter.
 pub fn imitators(library: &Library, best: &Best) -> Vec<Rival> {
     let bank = Bank::new(&best.frame, &library.entries[..library.listed]);
     let key = best.set.key();
@@ -21,7 +21,10 @@ pub fn imitators(library: &Library, best: &Best) -> Vec<Rival> {
         let frame = best.frame.with_data(series);
         let whole = frame.column(&full(series.clone()), 1.0);
         let others = best.set.without(i);
-        let chosen = others.chosen_free(&frame);
+        let chosen = others.chosen_about_nothing(&frame);
+        if chosen.left_in(&whole).0 < SAME_SNR * SAME_SNR {
+            continue;
+        }
         for index in (0..library.listed).filter(|index| !key.contains(index)) {
             let imitation = search::imitation(&bank, index, &chosen, &whole);
             if let Some((effect, imitation)) = imitation.filter(|(_, imitation)| imitation.left_snr < SAME_SNR) {
