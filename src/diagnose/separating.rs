@@ -11,6 +11,7 @@
 
 use std::sync::Arc;
 
+use crate::math::shared_work;
 use crate::physics::attitude::{self, Attitude};
 use crate::physics::orbit::{self, State};
 use crate::physics::{J2, Vec3, drag, gravity_gradient, rotation};
@@ -78,30 +79,38 @@ pub fn cheapest(scene: &Scene, noise: &[AxisNoise; 3], rivals: &[Rival]) -> Opti
     }
     let sets: Vec<Fitted> = rivals.iter().map(|rival| Fitted::new(scene, noise, rival)).collect::<Option<_>>()?;
     let now = Contest::new(scene, noise, &sets, None)?;
-    let mut best: Option<(Outcome, f64)> = None;
-    for action in actions(scene) {
-        for hours in HOURS {
-            let Some(outcome) = fly(scene, noise, &sets, &now, action, hours) else { continue };
-            let cost = hours + if matches!(action, Action::Turn) { 0.0 } else { MANOEUVRE_COST_H };
-            let better = best.as_ref().is_none_or(|(other, other_cost)| {
-                match (outcome.gain >= DECISIVE, other.gain >= DECISIVE) {
-                    (true, true) => (cost, -outcome.gain) < (*other_cost, -other.gain),
-                    (decides, other_decides) if decides != other_decides => decides,
-                    _ => outcome.gain > other.gain,
-                }
-            });
-            if better {
-                best = Some((outcome, cost));
-            }
+    let mut candidates: Vec<Candidate> =
+        actions(scene).into_iter().flat_map(|action| HOURS.map(|hours| Candidate { action, hours })).collect();
+    candidates.sort_by(|a, b| a.cost_h().total_cmp(&b.cost_h()));
+    let mut best: Option<Outcome> = None;
+    // One that decides beats whatever costs more.
+    for equal in candidates.chunk_by(|a, b| a.cost_h() == b.cost_h()) {
+        let flown = shared_work::map(equal, |candidate| fly(scene, noise, &sets, &now, *candidate));
+        best = best.into_iter().chain(flown.into_iter().flatten()).reduce(|a, b| if b.gain > a.gain { b } else { a });
+        if best.as_ref().is_some_and(|best| best.gain >= DECISIVE) {
+            break;
         }
     }
-    best.map(|(outcome, _)| outcome.told())
+    best.map(|outcome| outcome.told())
+}
+
+/// An action for so many hours.
+#[derive(Clone, Copy)]
+struct Candidate {
+    action: Action,
+    hours: f64,
+}
+
+impl Candidate {
+    /// What it costs, in hours.
+    fn cost_h(&self) -> f64 {
+        self.hours + if matches!(self.action, Action::Turn) { 0.0 } else { MANOEUVRE_COST_H }
+    }
 }
 
 /// What the simulation of a candidate shows.
 struct Outcome {
-    action: Action,
-    hours: f64,
+    candidate: Candidate,
     gain: f64,
     differ_ng: [f64; 3],
 }
@@ -109,7 +118,7 @@ struct Outcome {
 impl Outcome {
     fn told(&self) -> SeparatingObservation {
         let [x, y, z] = self.differ_ng.map(|ng| format!("{ng:.0}"));
-        let (kind, what) = match self.action {
+        let (kind, what) = match self.candidate.action {
             Action::Turn => (
                 "table_flip",
                 "Measure with the sensor's table turned by 180 degrees, the attitude held as it is,".to_string(),
@@ -124,7 +133,7 @@ impl Outcome {
         let text = format!(
             "{what} for {} h: the sets then differ by {x}, {y} and {z} ng rms along X, Y, Z from what they agree on now, and the true \
              one is expected to gain {:.1} in log evidence on its nearest rival.{verdict}",
-            self.hours, self.gain
+            self.candidate.hours, self.gain
         );
         SeparatingObservation { kind: kind.into(), text, gain: Some(round(self.gain)) }
     }
@@ -334,14 +343,8 @@ fn add(sum: &mut Axes, part: &Axes, factor: f64) {
 }
 
 /// Flies a candidate and has the sets compete on it.
-fn fly(
-    scene: &Scene,
-    noise: &[AxisNoise; 3],
-    sets: &[Fitted],
-    now: &Contest,
-    action: Action,
-    hours: f64,
-) -> Option<Outcome> {
+fn fly(scene: &Scene, noise: &[AxisNoise; 3], sets: &[Fitted], now: &Contest, candidate: Candidate) -> Option<Outcome> {
+    let Candidate { action, hours } = candidate;
     let (case, surroundings) = to_come(scene, action, hours)?;
     let ahead = Scene::within(&case, Arc::new(surroundings));
     let first = scene.schedule.len();
@@ -357,7 +360,7 @@ fn fly(
         };
         pairs.map(rms).fold(f64::INFINITY, f64::min)
     });
-    Some(Outcome { action, hours, gain: then.adds_to(now), differ_ng })
+    Some(Outcome { candidate, gain: then.adds_to(now), differ_ng })
 }
 
 /// The case with what is to come behind it: windows, simulation, orbit and environment.
