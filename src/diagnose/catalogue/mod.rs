@@ -110,10 +110,10 @@ pub struct Prior {
     pub size: f64,
 }
 
-/// What a term's own model (density, attitude, offset) may be off by where the whole of it is missing.
+/// What a term's own model (density, attitude, offset) may usually be off by where the whole of it is missing.
 const WHOLE_SIZE: f64 = 0.1;
 
-/// Fractions at which the whole of a term is missing, given what its own model may be off by.
+/// Fractions at which the whole of a term is missing: as far from one as its own model is off in storms, six usual sizes.
 const WHOLE: [f64; 2] = [0.4, 1.6];
 
 impl Linear {

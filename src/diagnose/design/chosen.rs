@@ -1,0 +1,200 @@
+//! The evidence of columns: of those chosen, and of more beside them.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::{Column, Frame};
+
+/// Normal equations of columns beside those chosen.
+pub struct Normal {
+    a: DMatrix<f64>,
+    y: DVector<f64>,
+    /// Prior means, in prior sizes.
+    mean: DVector<f64>,
+}
+
+/// Inverse square of how much wider a prior is taken where it must not decide: six times.
+const WIDE: f64 = 0.03;
+
+impl Normal {
+    /// Log evidence gained by these columns, their prior sizes all multiplied by `scale`.
+    pub fn gain(&self, scale: f64) -> f64 {
+        let n = self.y.len();
+        let a = &self.a * (scale * scale) + DMatrix::identity(n, n);
+        match Cholesky::new(a) {
+            Some(c) => {
+                let mean = &self.mean / scale;
+                let y = &self.y * scale + &mean;
+                let half = c.l_dirty().solve_lower_triangular(&y).unwrap_or_else(|| DVector::zeros(n));
+                let volume = (0..n).map(|i| c.l_dirty()[(i, i)].ln()).sum::<f64>();
+                0.5 * (half.norm_squared() - mean.norm_squared()) - volume
+            }
+            None => f64::NEG_INFINITY,
+        }
+    }
+
+    /// The normal equations of the same columns over this part of a record and another.
+    pub fn and(&self, other: &Normal) -> Normal {
+        Normal { a: &self.a + &other.a, y: &self.y + &other.y, mean: self.mean.clone() }
+    }
+
+    /// What the columns explain at most, their sizes free: half the chi square.
+    pub fn explained(&self) -> f64 {
+        self.free_fit().map_or(0.0, |(explained, _)| explained)
+    }
+
+    /// The same, with the sizes in units of their priors; `None` where rounding defeats it.
+    pub fn free_fit(&self) -> Option<(f64, DVector<f64>)> {
+        let n = self.y.len();
+        let jitter = 1e-9 * self.a.diagonal().max().max(1e-300);
+        let sizes = Cholesky::new(&self.a + DMatrix::identity(n, n) * jitter)?.solve(&self.y);
+        Some((0.5 * sizes.dot(&self.y), sizes))
+    }
+
+    /// Posterior mean of the sizes in units of their priors.
+    pub fn posterior_mean(&self) -> DVector<f64> {
+        let n = self.y.len();
+        Cholesky::new(&self.a + DMatrix::identity(n, n))
+            .map_or_else(|| DVector::zeros(n), |c| c.solve(&(&self.y + &self.mean)))
+    }
+
+    /// Whitened energy that a prediction from this part of a record is expected to miss of the series fitted to all of it, in the
+    /// part `unseen`: the posterior means of nested data differ by the fall of the posterior covariance. The priors are taken far
+    /// wider than they are, so that an effect several times its usual size is not thought to be known before it is seen.
+    pub fn expected_miss(&self, unseen: &Normal) -> f64 {
+        let n = self.y.len();
+        if n == 0 {
+            return 0.0;
+        }
+        let covariance = |a: &DMatrix<f64>| Cholesky::new(a + DMatrix::identity(n, n) * WIDE).map(|c| c.inverse());
+        match (covariance(&self.a), covariance(&(&self.a + &unseen.a))) {
+            (Some(seen), Some(all)) => (&unseen.a * (seen - all)).trace(),
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// Log evidence gained by column `i` alone.
+    pub fn gain_of(&self, i: usize, scale: f64) -> f64 {
+        let one_more = scale * scale * self.a[(i, i)] + 1.0;
+        let mean = self.mean[i] / scale;
+        0.5 * ((scale * self.y[i] + mean).powi(2) / one_more - mean * mean - one_more.ln())
+    }
+}
+
+/// Columns already chosen: what is left for one more.
+pub struct Chosen<'a> {
+    columns: Vec<&'a Column>,
+    data: Column,
+    cholesky: Option<Cholesky<f64, Dyn>>,
+    reduced: DVector<f64>,
+    /// Log evidence of the chosen columns against none.
+    pub log_evidence: f64,
+}
+
+impl<'a> Chosen<'a> {
+    /// Choose linear columns and columns of fixed amplitude one.
+    pub fn new(frame: &Frame, columns: Vec<&'a Column>, fixed: &[&Column]) -> Self {
+        let means = columns.iter().map(|c| c.mean).collect();
+        Self::about(frame, columns, means, fixed)
+    }
+
+    /// Choose linear columns, all prior means zero.
+    pub fn about_nothing(frame: &Frame, columns: Vec<&'a Column>) -> Self {
+        let means = vec![0.0; columns.len()];
+        Self::about(frame, columns, means, &[])
+    }
+
+    fn about(frame: &Frame, columns: Vec<&'a Column>, means: Vec<f64>, fixed: &[&Column]) -> Self {
+        let mut data = frame.data.clone();
+        for column in fixed {
+            data = data.less(column, 1.0);
+        }
+        let mut log_evidence =
+            if fixed.is_empty() { 0.0 } else { 0.5 * (frame.data.dot(&frame.data) - data.dot(&data)) };
+        let n = columns.len();
+        if n == 0 {
+            return Self { columns, data, cholesky: None, reduced: DVector::zeros(0), log_evidence };
+        }
+        let mut a = DMatrix::identity(n, n);
+        for i in 0..n {
+            for j in 0..=i {
+                let product = columns[i].dot(columns[j]);
+                a[(i, j)] += product;
+                if i != j {
+                    a[(j, i)] += product;
+                }
+            }
+        }
+        let y = DVector::from_iterator(n, columns.iter().zip(&means).map(|(c, mean)| c.dot(&data) + mean));
+        // A + I is positive definite but for rounding: a jitter of its size keeps a column of zeros harmless.
+        let cholesky = Cholesky::new(a.clone()).or_else(|| {
+            let jitter = 1e-10 * a.diagonal().max();
+            Cholesky::new(a + DMatrix::identity(n, n) * jitter)
+        });
+        let Some(cholesky) = cholesky else {
+            return Self { columns, data, cholesky: None, reduced: DVector::zeros(0), log_evidence: f64::NEG_INFINITY };
+        };
+        let reduced = cholesky.l_dirty().solve_lower_triangular(&y).unwrap_or_else(|| DVector::zeros(n));
+        let means: f64 = means.iter().map(|mean| mean * mean).sum();
+        let volume = (0..n).map(|i| cholesky.l_dirty()[(i, i)].ln()).sum::<f64>();
+        log_evidence += 0.5 * (reduced.norm_squared() - means) - volume;
+        Self { columns, data, cholesky: Some(cholesky), reduced, log_evidence }
+    }
+
+    fn overlap(&self, column: &Column) -> DVector<f64> {
+        let products = DVector::from_iterator(self.columns.len(), self.columns.iter().map(|c| c.dot(column)));
+        match &self.cholesky {
+            Some(c) => c.l_dirty().solve_lower_triangular(&products).unwrap_or(products),
+            None => products,
+        }
+    }
+
+    /// Log evidence gained by adding linear columns.
+    pub fn gain(&self, columns: &[Column]) -> f64 {
+        self.normal(columns).gain(1.0)
+    }
+
+    /// The normal equations of more linear columns beside those chosen.
+    pub fn normal(&self, columns: &[Column]) -> Normal {
+        let n = columns.len();
+        let overlaps: Vec<DVector<f64>> = columns.iter().map(|c| self.overlap(c)).collect();
+        let y = DVector::from_iterator(
+            n,
+            columns.iter().zip(&overlaps).map(|(c, o)| c.dot(&self.data) - o.dot(&self.reduced)),
+        );
+        let mut a = DMatrix::zeros(n, n);
+        for i in 0..n {
+            for j in 0..=i {
+                a[(i, j)] = columns[i].dot(&columns[j]) - overlaps[i].dot(&overlaps[j]);
+                a[(j, i)] = a[(i, j)];
+            }
+        }
+        let mean = DVector::from_iterator(n, columns.iter().map(|c| c.mean));
+        Normal { a, y, mean }
+    }
+
+    /// Log evidence gained by adding a column of fixed amplitude one.
+    pub fn gain_fixed(&self, column: &Column) -> f64 {
+        let overlap = self.overlap(column);
+        column.dot(&self.data) - overlap.dot(&self.reduced) - 0.5 * (column.dot(column) - overlap.dot(&overlap))
+    }
+
+    /// What is left of a column beside those chosen: its squared norm, and its product with what is left of the data.
+    pub fn left_in(&self, column: &Column) -> (f64, f64) {
+        let overlap = self.overlap(column);
+        (column.dot(column) - overlap.norm_squared(), column.dot(&self.data) - overlap.dot(&self.reduced))
+    }
+
+    /// Posterior mean and covariance of the scaled coefficients.
+    pub fn posterior(&self) -> (DVector<f64>, DMatrix<f64>) {
+        match &self.cholesky {
+            Some(c) => {
+                let mean = c
+                    .l_dirty()
+                    .tr_solve_lower_triangular(&self.reduced)
+                    .unwrap_or_else(|| DVector::zeros(self.columns.len()));
+                (mean, c.inverse())
+            }
+            None => (DVector::zeros(0), DMatrix::zeros(0, 0)),
+        }
+    }
+}

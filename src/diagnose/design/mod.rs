@@ -1,0 +1,292 @@
+//! Whitened columns and the evidence of a set of them.
+//!
+//! Given the noise everything is linear: d = X b + c + n, with b ~ N(m, prior), a constant c per axis without prior, and
+//! n whitened. The log evidence ratio of X against nothing is then
+//! 1/2 (y + m)' (A + I)^-1 (y + m) - 1/2 m'm - 1/2 log det (A + I), A = X'X and y = X'd, the columns scaled by their prior
+//! size (Kennedy and O'Hagan 2001 for why sizes need priors). Here are the columns and the noise behind which they stand; the
+//! evidence is in `chosen`. Not here: what the columns mean.
+
+mod chosen;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+pub use chosen::{Chosen, Normal};
+
+use crate::diagnose::noise::{AxisNoise, Loudness, Schedule, Whitener, dot};
+use crate::diagnose::scene::Axes;
+use crate::math::shared_work;
+
+/// A regressor before whitening: a series for every axis it acts on.
+pub type Raw = [Option<Vec<f64>>; 3];
+
+/// One axis of a whitened regressor: `factor` times what is shared with the same regressor of other sizes.
+#[derive(Debug, Clone)]
+struct Part {
+    first: usize,
+    whitened: Arc<Vec<f64>>,
+    /// Its products with what is nuisance on this axis.
+    nuisance: Vec<f64>,
+    factor: f64,
+}
+
+/// A whitened regressor, the constant of every axis projected out of every product.
+#[derive(Debug, Clone, Default)]
+pub struct Column {
+    parts: [Option<Part>; 3],
+    /// Mean of the prior of its coefficient, in prior sizes.
+    mean: f64,
+}
+
+impl Column {
+    /// Inner product after projection.
+    pub fn dot(&self, other: &Column) -> f64 {
+        let mut sum = 0.0;
+        for (a, b) in self.parts.iter().zip(&other.parts) {
+            let (Some(a), Some(b)) = (a, b) else { continue };
+            let first = a.first.max(b.first);
+            let end = (a.first + a.whitened.len()).min(b.first + b.whitened.len());
+            let product = if first < end {
+                dot(&a.whitened[first - a.first..end - a.first], &b.whitened[first - b.first..end - b.first])
+            } else {
+                0.0
+            };
+            let nuisance: f64 = a.nuisance.iter().zip(&b.nuisance).map(|(a, b)| a * b).sum();
+            sum += a.factor * b.factor * (product - nuisance);
+        }
+        sum
+    }
+
+    /// This column times `factor`.
+    pub fn times(&self, factor: f64) -> Column {
+        let mut out = self.clone();
+        out.parts.iter_mut().flatten().for_each(|part| part.factor *= factor);
+        out.mean /= factor;
+        out
+    }
+
+    /// The same about another prior mean, in prior sizes.
+    pub fn about(self, mean: f64) -> Column {
+        Column { mean, ..self }
+    }
+
+    /// This column less another times `factor`.
+    pub fn less(&self, other: &Column, factor: f64) -> Column {
+        let mut out = self.clone();
+        for (a, b) in out.parts.iter_mut().zip(&other.parts) {
+            let Some(b) = b else { continue };
+            let (first, end) = match a {
+                Some(a) => (a.first.min(b.first), (a.first + a.whitened.len()).max(b.first + b.whitened.len())),
+                None => (b.first, b.first + b.whitened.len()),
+            };
+            let mut whitened = vec![0.0; end - first];
+            let mut nuisance = vec![0.0; b.nuisance.len()];
+            let mut add = |part: &Part, factor: f64| {
+                whitened[part.first - first..].iter_mut().zip(&*part.whitened).for_each(|(x, y)| *x += factor * y);
+                nuisance.iter_mut().zip(&part.nuisance).for_each(|(x, y)| *x += factor * y);
+            };
+            if let Some(a) = &*a {
+                add(a, a.factor);
+            }
+            add(b, -factor * b.factor);
+            *a = Some(Part { first, whitened: Arc::new(whitened), nuisance, factor: 1.0 });
+        }
+        out
+    }
+
+    /// Whitened values of one axis with the share of what is nuisance removed; zero where the column is absent.
+    pub fn projected(&self, axis: usize, frame: &Frame) -> Vec<f64> {
+        let Some(p) = &self.parts[axis] else { return vec![0.0; frame.windows()] };
+        let mut values = vec![0.0; frame.windows()];
+        values[p.first..p.first + p.whitened.len()].copy_from_slice(&p.whitened);
+        for (series, product) in frame.nuisance[axis].iter().zip(&p.nuisance) {
+            values.iter_mut().zip(series).for_each(|(x, u)| *x -= product * u);
+        }
+        values.iter_mut().for_each(|x| *x *= p.factor);
+        values
+    }
+}
+
+/// A series on one axis and its prior size.
+#[derive(Debug, Clone, Copy)]
+pub struct OnAxis<'a> {
+    /// The body axis.
+    pub axis: usize,
+    /// The series at the windows.
+    pub series: &'a [f64],
+    /// Its prior size.
+    pub size: f64,
+}
+
+/// Series of an axis that are whitened side by side.
+const LANES: usize = 4;
+
+impl Column {
+    fn of(parts: impl IntoIterator<Item = (usize, Part)>) -> Self {
+        let mut column = Self::default();
+        for (axis, part) in parts {
+            column.parts[axis] = Some(part);
+        }
+        column
+    }
+}
+
+/// First window in which a series is not zero, and one past the last.
+fn span(series: &[f64]) -> [usize; 2] {
+    let first = series.iter().position(|x| *x != 0.0).unwrap_or(series.len());
+    [first, series.iter().rposition(|x| *x != 0.0).map_or(first, |i| i + 1)]
+}
+
+/// The noise of all axes turned into filters, and the data behind them.
+#[derive(Clone)]
+pub struct Frame {
+    whiteners: Arc<[Whitener; 3]>,
+    /// What is nuisance on each axis, whitened: the constant, of unit norm, and the errors all windows share, orthogonal to it and to
+    /// each other, each as far as the data and not its prior decide it.
+    nuisance: Arc<[Vec<Vec<f64>>; 3]>,
+    /// Log restricted likelihood but for the data's share.
+    log_det: f64,
+    /// The whitened residual.
+    pub data: Column,
+    /// Log restricted likelihood of no effect at all.
+    pub log_null: f64,
+}
+
+impl Frame {
+    /// From the noise of the three axes and the residual.
+    pub fn new(noise: &[AxisNoise; 3], schedule: &Schedule, loudness: &[Loudness; 3], residual_ng: &Axes) -> Self {
+        let whiteners: [Whitener; 3] = std::array::from_fn(|k| Whitener::new(&noise[k], schedule, &loudness[k]));
+        let mut log_det = 0.0;
+        let nuisance = std::array::from_fn(|k| {
+            let mut one = whiteners[k].whiten(&vec![1.0; schedule.len()]);
+            let norm = dot(&one, &one).sqrt();
+            one.iter_mut().for_each(|x| *x /= norm);
+            log_det -= 0.5 * whiteners[k].log_det() + norm.ln();
+            let (shared, decided) = shared_errors(&whiteners[k], &one, &schedule.shared_ng[k]);
+            log_det -= decided;
+            std::iter::once(one).chain(shared).collect()
+        });
+        let (whiteners, nuisance) = (Arc::new(whiteners), Arc::new(nuisance));
+        Self { whiteners, nuisance, log_det, data: Column::default(), log_null: log_det }.with_data(residual_ng)
+    }
+
+    /// A residual less the likeliest of the errors that all windows share.
+    pub fn less_shared_errors(&self, residual_ng: &Axes, shared_ng: &[Vec<Vec<f64>>; 3]) -> Axes {
+        std::array::from_fn(|k| {
+            let mut left = residual_ng[k].clone();
+            let beside = |series: &Vec<f64>| beside_one(&self.whiteners[k], &self.nuisance[k][0], series);
+            let (data, columns) = (beside(&left), shared_ng[k].iter().map(beside).collect::<Vec<_>>());
+            let m = columns.len();
+            let normal = DMatrix::from_fn(m, m, |i, j| dot(&columns[i], &columns[j])) + DMatrix::identity(m, m);
+            let right = DVector::from_fn(m, |i, _| dot(&columns[i], &data));
+            let Some(normal) = Cholesky::new(normal).filter(|_| m > 0) else { return left };
+            for (size, series) in normal.solve(&right).iter().zip(&shared_ng[k]) {
+                left.iter_mut().zip(series).for_each(|(x, error)| *x -= size * error);
+            }
+            left
+        })
+    }
+
+    fn windows(&self) -> usize {
+        self.nuisance[0][0].len()
+    }
+
+    /// The same filters, another residual.
+    pub fn with_data(&self, residual_ng: &Axes) -> Self {
+        let data = self.column(&std::array::from_fn(|k| Some(residual_ng[k].clone())), 1.0);
+        let log_null = self.log_det - 0.5 * data.dot(&data);
+        Self { data, log_null, ..self.clone() }
+    }
+
+    /// Whiten a regressor, scaled by its prior size.
+    pub fn column(&self, raw: &Raw, size: f64) -> Column {
+        if let [Some(x), Some(y), Some(z)] = raw
+            && [x, y, z].into_iter().all(|series| span(series) == [0, series.len()])
+        {
+            let whitened = Whitener::whiten_three(&self.whiteners, [x, y, z]);
+            return Column::of(whitened.into_iter().enumerate().map(|(k, w)| (k, self.part(k, 0, w, size))));
+        }
+        let on_axes = raw.iter().enumerate().filter_map(|(axis, series)| Some((axis, series.as_ref()?)));
+        Column::of(on_axes.map(|(axis, series)| {
+            let span = span(series);
+            let [whitened] = self.whiteners[axis].whiten_spans([series], [span]);
+            (axis, self.part(axis, span[0], whitened, size))
+        }))
+    }
+
+    /// Whiten many regressors, each by its series on the axes it acts on: those of an axis side by side.
+    pub fn columns(&self, many: &[Vec<OnAxis>]) -> Vec<Column> {
+        let spans: Vec<Vec<[usize; 2]>> =
+            shared_work::map(many, |parts| parts.iter().map(|part| span(part.series)).collect());
+        let flat: Vec<(usize, OnAxis, [usize; 2])> = many
+            .iter()
+            .zip(spans)
+            .enumerate()
+            .flat_map(|(owner, (parts, spans))| parts.iter().zip(spans).map(move |(part, span)| (owner, *part, span)))
+            .collect();
+        let mut order: Vec<usize> = (0..flat.len()).collect();
+        order.sort_by_key(|i| (flat[*i].1.axis, flat[*i].2));
+        let groups: Vec<&[usize]> =
+            order.chunk_by(|a, b| flat[*a].1.axis == flat[*b].1.axis).flat_map(|axis| axis.chunks(LANES)).collect();
+        let parts = shared_work::map(&groups, |group| {
+            // A group that is not full whitens its first series again in the lanes left over.
+            let lanes: [usize; LANES] = std::array::from_fn(|l| group[if l < group.len() { l } else { 0 }]);
+            let axis = flat[group[0]].1.axis;
+            let whitened = self.whiteners[axis].whiten_spans(lanes.map(|i| flat[i].1.series), lanes.map(|i| flat[i].2));
+            let whitened = lanes.into_iter().zip(whitened).take(group.len());
+            whitened.map(|(i, w)| self.part(axis, flat[i].2[0], w, flat[i].1.size)).collect::<Vec<Part>>()
+        });
+        let mut columns = vec![Column::default(); many.len()];
+        for (i, part) in order.iter().zip(parts.into_iter().flatten()) {
+            let (owner, OnAxis { axis, .. }, _) = flat[*i];
+            columns[owner].parts[axis] = Some(part);
+        }
+        columns
+    }
+
+    fn part(&self, axis: usize, first: usize, whitened: Vec<f64>, size: f64) -> Part {
+        let products = self.nuisance[axis].iter();
+        let nuisance = products.map(|u| dot(&whitened, &u[first..first + whitened.len()])).collect();
+        Part { first, whitened: Arc::new(whitened), nuisance, factor: size }
+    }
+
+    /// Whiten a scalar on one axis.
+    pub fn scalar(&self, axis: usize, series: &[f64], size: f64) -> Column {
+        self.columns(&[vec![OnAxis { axis, series, size }]]).swap_remove(0)
+    }
+}
+
+/// A series whitened, and made orthogonal to the whitened constant, which is of unit norm.
+fn beside_one(whitener: &Whitener, one: &[f64], series: &[f64]) -> Vec<f64> {
+    let mut whitened = whitener.whiten(series);
+    let constant = dot(&whitened, one);
+    whitened.iter_mut().zip(one).for_each(|(x, one)| *x -= constant * one);
+    whitened
+}
+
+/// Whitened errors that all windows share, made orthogonal to the constant and to each other, each by the root of the share of it
+/// that the data decide; and what they take from the log likelihood.
+fn shared_errors(whitener: &Whitener, one: &[f64], shared_ng: &[Vec<f64>]) -> (Vec<Vec<f64>>, f64) {
+    let whitened: Vec<Vec<f64>> = shared_ng.iter().map(|series| beside_one(whitener, one, series)).collect();
+    let m = whitened.len();
+    if m == 0 {
+        return (Vec::new(), 0.0);
+    }
+    let eigen = DMatrix::from_fn(m, m, |i, j| dot(&whitened[i], &whitened[j])).symmetric_eigen();
+    let mut decided = 0.0;
+    let mut series = Vec::new();
+    for (j, energy) in eigen.eigenvalues.iter().enumerate().filter(|(_, energy)| **energy > 1e-6) {
+        decided += 0.5 * (1.0 + energy).ln();
+        let scale = (1.0 + energy).sqrt().recip();
+        let mut sum = vec![0.0; one.len()];
+        for (i, w) in whitened.iter().enumerate() {
+            let factor = scale * eigen.eigenvectors[(i, j)];
+            sum.iter_mut().zip(w).for_each(|(sum, w)| *sum += factor * w);
+        }
+        series.push(sum);
+    }
+    (series, decided)
+}
