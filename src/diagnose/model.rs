@@ -4,7 +4,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::design::{Column, Frame};
+use super::catalogue::{Effect, Shape};
+use super::design::{Column, Frame, Raw};
 use super::scene::{Axes, Scene};
 use super::search::{Entry, Family, Set};
 
@@ -139,9 +140,17 @@ fn onset_sigma(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: us
 fn joint_covariance(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) -> Option<DMatrix<f64>> {
     let mut columns: Vec<Column> = Vec::new();
     let mut prior: Vec<f64> = Vec::new();
+    let (mean, linear) = set.coefficients(frame, entries);
     for m in &set.members {
         let entry = &entries[m.entry];
-        let raws = entry_columns(scene, entry, &m.theta)?;
+        let first = columns.len();
+        let raws = match entry.family {
+            Family::Listed(Effect { exact_at: Some(exact_at), signature, .. }) => {
+                let fitted = || (first..first + m.linear()).map(|k| (mean[k], linear[(k, k)].max(1e-12).sqrt()));
+                derivatives(&fitted().collect::<Vec<_>>(), |at| (signature)(scene, &exact_at(at)))?
+            }
+            _ => entry_columns(scene, entry, &m.theta)?,
+        };
         for k in 0..m.linear() {
             columns.push(frame.column(&raws[m.axis.unwrap_or(k)], 1.0));
             prior.push((m.scale * entry.sizes[m.axis.unwrap_or(k)]).powi(-2));
@@ -178,8 +187,35 @@ fn joint_covariance(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) 
     Some(DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]))
 }
 
+/// Derivatives of a series that is only nearly linear in its coefficients, from a standard error below each of them to one above;
+/// `signature` gives the columns that are exact at coefficients.
+fn derivatives(fitted: &[(f64, f64)], signature: impl Fn(&[f64]) -> Option<Shape>) -> Option<Vec<Raw>> {
+    let series = |k: usize, sign: f64| -> Option<Raw> {
+        let mut at: Vec<f64> = fitted.iter().map(|(value, _)| *value).collect();
+        at[k] += sign * fitted[k].1;
+        let columns = signature(&at)?.columns();
+        let sum = |axis: usize| {
+            let parts: Vec<(&f64, &Vec<f64>)> =
+                at.iter().zip(&columns).filter_map(|(a, c)| Some((a, c[axis].as_ref()?))).collect();
+            let windows = parts.first()?.1.len();
+            Some((0..windows).map(|i| parts.iter().map(|(a, c)| *a * c[i]).sum()).collect())
+        };
+        Some(std::array::from_fn(sum))
+    };
+    (0..fitted.len())
+        .map(|k| {
+            let (high, low) = (series(k, 1.0)?, series(k, -1.0)?);
+            let difference = |(high, low): (Vec<f64>, Vec<f64>)| -> Vec<f64> {
+                high.iter().zip(&low).map(|(a, b)| (a - b) / (2.0 * fitted[k].1)).collect()
+            };
+            let [x, y, z] = std::array::from_fn(|axis| Some(difference((high[axis].clone()?, low[axis].clone()?))));
+            Some([x, y, z])
+        })
+        .collect()
+}
+
 /// The columns of an entry at values of its nonlinear parameters, before whitening.
-pub fn entry_columns(scene: &Scene, entry: &Entry, theta: &super::catalogue::Theta) -> Option<Vec<super::design::Raw>> {
+pub fn entry_columns(scene: &Scene, entry: &Entry, theta: &super::catalogue::Theta) -> Option<Vec<Raw>> {
     match entry.family {
         Family::Listed(effect) => (effect.signature)(scene, theta).map(|s| s.columns()),
         Family::Open(_) => entry.points.get(theta[0] as usize).map(|(_, shape)| shape.columns()),

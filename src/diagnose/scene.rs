@@ -42,6 +42,10 @@ pub struct Surroundings {
     pub sunlit: Vec<f64>,
     /// Geomagnetic field, body axes, T.
     pub field_body_t: Vec<Vec3>,
+    /// Velocity relative to an atmosphere that turns with the Earth, body axes, m/s.
+    pub relative_m_s: Vec<Vec3>,
+    /// Directions along the track and across it, body axes.
+    pub track: Vec<[Vec3; 2]>,
     /// Drag as modelled with a co-rotating atmosphere, body axes, ng.
     pub drag_ng: Vec<Vec3>,
     /// Density the simulation used.
@@ -95,9 +99,12 @@ impl Surroundings {
         let sun: Vec<Vec3> = unix.iter().map(|t| physics::sun::direction(*t)).collect();
         let sunlit = r_m.iter().zip(&sun).map(|(r, s)| physics::shadow::sunlit_fraction(r, s)).collect();
         let field_body_t = fields(&unix, &r_m, &body)?;
-        let drag_ng = (0..r_m.len())
-            .map(|i| drag_ng(&vehicle, anc.density_kg_m3[i], &r_m[i], &v_m_s[i], &body[i], 1.0, &Vec3::zeros()))
-            .collect();
+        let relative =
+            |i: usize| body[i] * physics::drag::relative_velocity_m_s(&r_m[i], &v_m_s[i], 1.0, &Vec3::zeros());
+        let relative_m_s: Vec<Vec3> = (0..r_m.len()).map(relative).collect();
+        let unit_wind = |i: usize, along, cross| body[i] * physics::drag::wind_m_s(&r_m[i], &v_m_s[i], along, cross);
+        let track = (0..r_m.len()).map(|i| [unit_wind(i, 1.0, 0.0), unit_wind(i, 0.0, 1.0)]).collect();
+        let drag_ng = relative_m_s.iter().zip(&anc.density_kg_m3).map(|(v, rho)| drag_ng(&vehicle, *rho, v)).collect();
         let period_s = period_s(&r_m[0], &v_m_s[0]);
         let simulation = &expected.simulation;
         Ok(Self {
@@ -114,6 +121,8 @@ impl Surroundings {
             sun,
             sunlit,
             field_body_t,
+            relative_m_s,
+            track,
             drag_ng,
             density_kg_m3: anc.density_kg_m3.clone(),
             temperature_c: anc.temperature_c.clone(),
@@ -128,6 +137,7 @@ impl Surroundings {
         let mut cut = self.clone();
         cut.simulated_grid_ng.iter_mut().for_each(|series| series.truncate(points));
         cut.body.truncate(points);
+        cut.track.truncate(points);
         for series in [
             &mut cut.r_m,
             &mut cut.v_m_s,
@@ -135,6 +145,7 @@ impl Surroundings {
             &mut cut.wdot_rad_s2,
             &mut cut.sun,
             &mut cut.field_body_t,
+            &mut cut.relative_m_s,
             &mut cut.drag_ng,
         ] {
             series.truncate(points);
@@ -157,6 +168,8 @@ impl Surroundings {
         self.wdot_rad_s2.extend(&later.wdot_rad_s2);
         self.sun.extend(&later.sun);
         self.field_body_t.extend(&later.field_body_t);
+        self.relative_m_s.extend(&later.relative_m_s);
+        self.track.extend(&later.track);
         self.drag_ng.extend(&later.drag_ng);
         self.grid_s.extend(&later.grid_s);
         self.sunlit.extend(&later.sunlit);
@@ -220,9 +233,17 @@ impl<'a> Scene<'a> {
         self.measurement.apply(&(0..self.grid_s.len()).map(on_grid).collect::<Vec<f64>>())
     }
 
-    /// Drag at grid point `i` with another co-rotation or wind, ng, body axes.
-    pub fn drag_with(&self, i: usize, corotation: f64, wind_m_s: &Vec3) -> Vec3 {
-        drag_ng(&self.vehicle, self.density_kg_m3[i], &self.r_m[i], &self.v_m_s[i], &self.body[i], corotation, wind_m_s)
+    /// Drag at grid point `i` in a wind along the track and across it, ng, body axes.
+    pub fn drag_in_wind(&self, i: usize, along_m_s: f64, cross_m_s: f64) -> Vec3 {
+        let [along, cross] = &self.track[i];
+        let relative = self.relative_m_s[i] - along * along_m_s - cross * cross_m_s;
+        drag_ng(&self.vehicle, self.density_kg_m3[i], &relative)
+    }
+
+    /// Drag at grid point `i` in an atmosphere at rest, ng, body axes.
+    pub fn drag_at_rest(&self, i: usize) -> Vec3 {
+        let relative = physics::drag::relative_velocity_m_s(&self.r_m[i], &self.v_m_s[i], 0.0, &Vec3::zeros());
+        drag_ng(&self.vehicle, self.density_kg_m3[i], &(self.body[i] * relative))
     }
 
     /// Tensor T of a = T r: what a sensor offset of one metre feels, 1/s^2, at grid point `i`, body axes.
@@ -279,17 +300,8 @@ fn fields(unix: &[f64], r_m: &[Vec3], body: &[Mat3]) -> Result<Vec<Vec3>, CaseEr
         .collect()
 }
 
-fn drag_ng(
-    vehicle: &physics::vehicle::Vehicle,
-    density: f64,
-    r: &Vec3,
-    v: &Vec3,
-    body: &Mat3,
-    corotation: f64,
-    wind: &Vec3,
-) -> Vec3 {
-    let relative = body * physics::drag::relative_velocity_m_s(r, v, corotation, wind);
-    physics::drag::acceleration_m_s2(vehicle, density, &relative) / NANO_G_M_S2
+fn drag_ng(vehicle: &physics::vehicle::Vehicle, density_kg_m3: f64, relative_body_m_s: &Vec3) -> Vec3 {
+    physics::drag::acceleration_m_s2(vehicle, density_kg_m3, relative_body_m_s) / NANO_G_M_S2
 }
 
 fn period_s(r: &Vec3, v: &Vec3) -> f64 {

@@ -4,6 +4,7 @@ mod bursts;
 mod dump;
 mod separating;
 mod trial;
+mod wind;
 
 use std::path::PathBuf;
 

@@ -15,6 +15,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual points against the velocity in every attitude and scales with the modelled drag.",
 };
 

@@ -2,7 +2,6 @@
 
 use super::{Effect, Linear, Shape, full, no_volume, one_point};
 use crate::diagnose::scene::Scene;
-use crate::physics::Vec3;
 
 /// The entry.
 pub const EFFECT: Effect = Effect {
@@ -16,9 +15,10 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual has the cross-track part that a turning atmosphere gives, changing sign between ascending and descending passes, with a small loss of drag along the track.",
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    Some(Shape::Columns(vec![full(scene.measure(|i| scene.drag_ng[i] - scene.drag_with(i, 0.0, &Vec3::zeros())))]))
+    Some(Shape::Columns(vec![full(scene.measure(|i| scene.drag_ng[i] - scene.drag_at_rest(i)))]))
 }

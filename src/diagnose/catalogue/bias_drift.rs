@@ -16,6 +16,7 @@ pub const EFFECT: Effect = Effect {
     grid,
     log_volume,
     signature,
+    exact_at: None,
     why: "The bias of each sensor axis relaxes from the beginning of the record with one time constant, whatever the attitude does.",
 };
 

@@ -22,6 +22,7 @@ pub const EFFECT: Effect = Effect {
     grid,
     log_volume,
     signature,
+    exact_at: None,
     why: "Each sensor axis jumps once, at one instant, and stays there whatever the attitude does.",
 };
 

@@ -21,6 +21,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual is linear in the gravity-gradient and rotation tensor: it changes with every attitude as a displaced sensor must, and a bias cannot.",
 };
 

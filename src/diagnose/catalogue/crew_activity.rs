@@ -15,6 +15,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual shifts at the logged ends of the sleep periods and nowhere else.",
 };
 

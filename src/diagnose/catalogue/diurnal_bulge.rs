@@ -16,6 +16,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual lies along the drag, once per orbit, strongest when the vehicle passes the afternoon side: it follows the Sun and not the perigee.",
 };
 

@@ -17,6 +17,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual is the gravity gradient at the assumed sensor position: it turns with the local vertical in body axes and follows every attitude change.",
 };
 

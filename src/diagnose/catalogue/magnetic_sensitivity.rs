@@ -26,6 +26,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual is linear in the geomagnetic field in body axes: it follows magnetic latitude, with the Earth turning below the orbit.",
 };
 

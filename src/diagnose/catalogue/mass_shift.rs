@@ -29,6 +29,7 @@ pub const EFFECT: Effect = Effect {
     grid,
     log_volume,
     signature,
+    exact_at: None,
     why: "The residual begins at a logged change of mass and follows the gravity-gradient and rotation tensor from there on: the centre of gravity moved.",
 };
 

@@ -20,6 +20,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "What one axis should read leaks into the others with fixed small angles, in every attitude.",
 };
 

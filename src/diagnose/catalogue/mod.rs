@@ -83,6 +83,8 @@ pub struct Effect {
     pub log_volume: fn(&Scene) -> f64,
     /// Its series at `Theta`, `None` where the case does not allow it (no such event, for one).
     pub signature: fn(&Scene, &Theta) -> Option<Shape>,
+    /// Where its series is only nearly linear in its coefficients: the `Theta` whose columns are exact at these coefficients.
+    pub exact_at: Option<fn(&[f64]) -> Theta>,
     /// Why it is this one, for a flight engineer.
     pub why: &'static str,
 }

@@ -17,6 +17,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual follows the square of the body rates and their change at the assumed sensor position, largest in manoeuvres.",
 };
 

@@ -15,6 +15,7 @@ pub const EFFECT: Effect = Effect {
     grid,
     log_volume,
     signature,
+    exact_at: None,
     why: "All the modelled physics of one axis is off by the same factor, gravity gradient and drag alike, and the other axes are not.",
 };
 

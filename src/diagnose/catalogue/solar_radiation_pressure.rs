@@ -17,6 +17,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual points away from the Sun and switches at the edges of the shadow, without lag.",
 };
 

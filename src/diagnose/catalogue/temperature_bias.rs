@@ -20,6 +20,7 @@ pub const EFFECT: Effect = Effect {
     grid,
     log_volume,
     signature,
+    exact_at: None,
     why: "The residual is proportional to the sensor temperature on every axis, swings with the daily and orbital cycle and lags as stated.",
 };
 

@@ -1,14 +1,18 @@
-//! Wind beside co-rotation, steady along and across the track: the derivative of drag by wind.
+//! Wind beside co-rotation, steady along and across the track: drag in it less drag without it.
+//!
+//! The projected area has a kink where an axis is square to the flow, as across the track of a vehicle that flies nose first: a
+//! cross wind then shows more area whichever way it blows. So no one derivative serves. The columns are taken about a wind, exact
+//! there and to first order beside it, and the wind they are taken about follows the one fitted.
 
-use super::{Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, Theta, full, no_volume};
 use crate::diagnose::scene::Scene;
-use crate::physics::{Vec3, drag};
+use crate::physics::Vec3;
 
 /// The entry.
 pub const EFFECT: Effect = Effect {
     id: "thermospheric_wind",
     name: "Thermospheric wind",
-    equation: "a_d(v - wind) - a_d(v), linear in the wind",
+    equation: "a_d(v - wind) - a_d(v)",
     source: "200 m/s change drag by 2.6 %; several hundred in storms",
     mistaken_for: &["atmosphere_corotation", "aerodynamic_drag"],
     linear: &[
@@ -16,21 +20,43 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "cross_m_s", unit: "m/s", size: 300.0, size_max: 800.0, whole: false },
     ],
     nonlinear: &[],
-    grid: one_point,
+    grid: headings,
     log_volume: no_volume,
-    signature,
+    signature: about,
+    exact_at: Some(|wind_m_s| [wind_m_s[0], wind_m_s[1]]),
     why: "The residual is what a steady wind along and across the track does to the drag, of a speed that the thermosphere has.",
 };
 
-/// Step of the derivative, m/s: small against the orbital speed, large against rounding.
+/// Speed of the winds the search begins about, m/s, and their number, all round.
+const SPEED_M_S: f64 = 300.0;
+const HEADINGS: u8 = 4;
+
+/// Slowest wind the columns are taken about, m/s, and the step of their derivative: small against the orbital speed, large against
+/// rounding.
 const STEP_M_S: f64 = 10.0;
 
-fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    let column = |along: f64, cross: f64| {
-        full(scene.measure(|i| {
-            let wind: Vec3 = drag::wind_m_s(&scene.r_m[i], &scene.v_m_s[i], along * STEP_M_S, cross * STEP_M_S);
-            (scene.drag_with(i, 1.0, &wind) - scene.drag_ng[i]) / STEP_M_S
-        }))
-    };
-    Some(Shape::Columns(vec![column(1.0, 0.0), column(0.0, 1.0)]))
+fn headings(_: &Scene) -> Vec<Theta> {
+    let turn = |i: u8| std::f64::consts::TAU * (f64::from(i) + 0.5) / f64::from(HEADINGS);
+    (0..HEADINGS).map(|i| [SPEED_M_S * turn(i).cos(), SPEED_M_S * turn(i).sin()]).collect()
+}
+
+/// Columns by the wind along and across the track about `theta`: of a change of its speed by proportion, of a change of its
+/// heading by derivative.
+fn about(scene: &Scene, theta: &Theta) -> Option<Shape> {
+    let heading = theta[1].atan2(theta[0]);
+    let (sin, cos) = heading.sin_cos();
+    let speed = theta[0].hypot(theta[1]).max(STEP_M_S);
+    let grid = 0..scene.grid_s.len();
+    let (mut along, mut cross) = (Vec::with_capacity(grid.len()), Vec::with_capacity(grid.len()));
+    for i in grid {
+        let wind = |forward: f64, sideways: f64| -> Vec3 {
+            scene.drag_in_wind(i, forward * cos - sideways * sin, forward * sin + sideways * cos)
+        };
+        let there = wind(speed, 0.0);
+        let by_speed = (there - scene.drag_ng[i]) / speed;
+        let by_heading = (wind(speed, STEP_M_S) - wind(speed, -STEP_M_S)) / (2.0 * STEP_M_S);
+        along.push(by_speed * cos - by_heading * sin);
+        cross.push(by_speed * sin + by_heading * cos);
+    }
+    Some(Shape::Columns([along, cross].map(|column| full(scene.measure(|i| column[i]))).into()))
 }

@@ -15,6 +15,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual is a push fixed in the body that is there only while logged firings last.",
 };
 

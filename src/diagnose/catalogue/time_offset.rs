@@ -16,6 +16,7 @@ pub const EFFECT: Effect = Effect {
     grid,
     log_volume,
     signature,
+    exact_at: None,
     why: "The recording shows the modelled signal late or early: the difference follows its time derivative, manoeuvres above all.",
 };
 

@@ -19,6 +19,7 @@ pub const EFFECT: Effect = Effect {
     grid,
     log_volume,
     signature,
+    exact_at: None,
     why: "A push fixed in the body begins at an instant no log names and dies away exponentially, whatever the attitude does.",
 };
 

@@ -15,6 +15,7 @@ pub const EFFECT: Effect = Effect {
     grid: one_point,
     log_volume: no_volume,
     signature,
+    exact_at: None,
     why: "The residual is a push fixed in the body that begins and ends with the logged water dumps.",
 };
 

@@ -1,8 +1,9 @@
-//! The nonlinear parameters of a set: their best values, and the volume of their posterior.
+//! The nonlinear parameters of a set: their best values, and the volume of their posterior; and where columns that are only nearly
+//! linear are taken.
 
 use nalgebra::DMatrix;
 
-use super::{Entry, Set, point_at, whiten};
+use super::{Entry, Member, Set, point_at, whiten};
 use crate::diagnose::catalogue::{Effect, Theta};
 use crate::diagnose::design::Frame;
 use crate::diagnose::optimise::nelder_mead;
@@ -13,6 +14,10 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
     for i in 0..set.members.len() {
         let entry = &entries[set.members[i].entry];
         let Some(effect) = entry.effect() else { continue };
+        if let Some(exact_at) = effect.exact_at {
+            follow(scene, frame, entries, set, i, exact_at);
+            continue;
+        }
         let free: Vec<usize> = (0..effect.nonlinear.len()).filter(|j| effect.nonlinear[*j].step > 0.0).collect();
         if free.is_empty() {
             continue;
@@ -52,6 +57,34 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         }
     }
     set.weigh(frame, entries);
+}
+
+/// Times the columns of a member are taken anew at most, the first ones without half of the way back, which ends a swing between
+/// two points; and the change of their point that is none, of its prior size.
+const FOLLOWED: usize = 6;
+const FREE: usize = 2;
+const ARRIVED: f64 = 0.02;
+
+/// Takes the columns of member `i` where they are exact at the coefficients fitted, whether or not others explain more: those are not
+/// the effect.
+fn follow(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set, i: usize, exact_at: fn(&[f64]) -> Theta) {
+    let entry = &entries[set.members[i].entry];
+    set.members[i].log_occam = -(entry.scales().len() as f64).ln();
+    set.weigh(frame, entries);
+    for round in 0..FOLLOWED {
+        let first: usize = set.members[..i].iter().map(Member::linear).sum();
+        let m = &set.members[i];
+        let mut theta = exact_at(&set.coefficients(frame, entries).0.as_slice()[first..first + m.linear()]);
+        if round >= FREE {
+            theta = std::array::from_fn(|j| 0.5 * (theta[j] + m.theta[j]));
+        }
+        let moved = theta.iter().zip(&m.theta).zip(&entry.sizes).any(|((a, b), size)| (a - b).abs() > ARRIVED * size);
+        let Some(point) = point_at(scene, frame, entry, m, &theta).filter(|_| moved) else { return };
+        let mut next = set.clone();
+        (next.members[i].theta, next.members[i].point) = (theta, point);
+        next.weigh(frame, entries);
+        *set = next;
+    }
 }
 
 /// Laplace volume of the nonlinear parameters around their peak against their prior's, and their standard errors.
