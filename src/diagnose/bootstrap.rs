@@ -112,8 +112,9 @@ impl<'a> Bootstrap<'a> {
         let frame = self.frame.with_data(residual_ng);
         let nothing = Set::default();
         let chosen = nothing.chosen(&frame);
+        let seen = self.bank.before(&frame.data);
         (0..self.library.entries.len())
-            .map(|i| search::best_of_entry(&self.bank, i, &chosen).0)
+            .map(|i| search::best_of_entry(&seen, i, &chosen).0)
             .fold(f64::NEG_INFINITY, f64::max)
     }
 }

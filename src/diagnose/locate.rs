@@ -2,6 +2,7 @@
 
 use nalgebra::SymmetricEigen;
 
+use crate::math::shared_work;
 use crate::physics::{Mat3, Vec3};
 
 use super::answer::{Covariate, Interval, Located, OrbitLine};
@@ -128,13 +129,13 @@ pub fn lines(scene: &Scene, frame: &Frame) -> Vec<OrbitLine> {
     let empty = Chosen::new(frame, Vec::new(), &[]);
     let cycles: Vec<f64> = (1..=60).map(|i| 0.1 * i as f64).collect();
     let charge = ((cycles.len() * 3) as f64).ln() + 4.0;
-    let mut found: Vec<(f64, OrbitLine)> = Vec::new();
-    for &c in &cycles {
+    let lines = |c: &f64| {
         let rate = std::f64::consts::TAU * c / scene.period_s;
         let [sin, cos]: [Vec<f64>; 2] = [
             scene.clock_s().iter().map(|t| (rate * t).sin()).collect(),
             scene.clock_s().iter().map(|t| (rate * t).cos()).collect(),
         ];
+        let mut found: Vec<(f64, OrbitLine)> = Vec::new();
         for axis in 0..3 {
             let columns = [frame.scalar(axis, &sin, 30.0), frame.scalar(axis, &cos, 30.0)];
             let gain = empty.gain(&columns);
@@ -151,7 +152,9 @@ pub fn lines(scene: &Scene, frame: &Frame) -> Vec<OrbitLine> {
                 ));
             }
         }
-    }
+        found
+    };
+    let mut found: Vec<(f64, OrbitLine)> = shared_work::map(&cycles, lines).into_iter().flatten().collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     // The side lobes of a stronger line are not lines.
     let mut kept: Vec<OrbitLine> = Vec::new();

@@ -79,6 +79,40 @@ impl Measurement {
     }
 }
 
+/// Window means as [`Measurement`] gives them, for one use: from the integral of the series, without weights.
+pub fn window_means(grid: &[f64], series: &[f64], clock_s: &[f64], ahead_s: f64) -> Vec<f64> {
+    let last = grid.len() - 1;
+    let mut integral = Vec::with_capacity(grid.len());
+    let mut sum = 0.0;
+    integral.push(sum);
+    for j in 0..last {
+        sum += 0.5 * (series[j] + series[j + 1]) * (grid[j + 1] - grid[j]);
+        integral.push(sum);
+    }
+    // What lies beyond the grid takes the value at its edge.
+    let until = |t: f64, cell: &mut usize| {
+        if t <= grid[0] {
+            return series[0] * (t - grid[0]);
+        }
+        if t >= grid[last] {
+            return sum + series[last] * (t - grid[last]);
+        }
+        while grid[*cell + 1] < t {
+            *cell += 1;
+        }
+        let (j, into) = (*cell, t - grid[*cell]);
+        let slope = (series[j + 1] - series[j]) / (grid[j + 1] - grid[j]);
+        integral[j] + into * (series[j] + 0.5 * slope * into)
+    };
+    let (mut low, mut high) = (0, 0);
+    let mean = |t: &f64| {
+        let centre = t - ahead_s;
+        let inside = until(centre + HALF_WINDOW_S, &mut high) - until(centre - HALF_WINDOW_S, &mut low);
+        inside / (2.0 * HALF_WINDOW_S)
+    };
+    clock_s.iter().map(mean).collect()
+}
+
 /// Spans in order, those that overlap or touch made one.
 pub fn union(mut spans: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -143,6 +177,19 @@ mod tests {
         }
         let ones = m.apply(&vec![1.0; 50]);
         assert!(ones.iter().all(|w| (w - 1.0).abs() < 1e-12), "{ones:?}");
+    }
+
+    #[test]
+    fn the_integral_gives_the_means_that_the_weights_give() {
+        let grid: Vec<f64> = (0..400).map(|i| 20.0 * f64::from(i) + f64::from(i % 7)).collect();
+        let series: Vec<f64> = grid.iter().map(|t| 80.0 * (t / 900.0).sin() + t % 61.0).collect();
+        let clock: Vec<f64> = (0..240).map(|i| 700.0 + 25.3 * f64::from(i)).collect();
+        for ahead in [-590.0, -33.3, 0.0, 0.1, 610.0] {
+            let weighed = Measurement::new(&grid, &clock, ahead).apply(&series);
+            let integrated = window_means(&grid, &series, &clock, ahead);
+            assert!(weighed.iter().zip(&integrated).all(|(a, b)| (a - b).abs() < 1e-9), "{ahead}");
+        }
+        assert_eq!(window_means(&[0.0, 10.0], &[2.0, 5.0], &[-100.0, 200.0], 0.0), [2.0, 5.0]);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::design::Frame;
 use super::noise::AxisNoise;
 use super::open_form::{self, Said};
 use super::scene::Scene;
-use super::search::{self, Bank, Entry, SET_MAX, Set, Weighed};
+use super::search::{self, Bank, Entry, SET_MAX, Seen, Set, Weighed};
 use crate::math::shared_work;
 
 /// Log prior odds of the open forms together; they share it.
@@ -115,7 +115,8 @@ pub fn solve_unless(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3]
     // candidate is weighed with the noise of its own residual as all are.
     if let Some(quiet) = quiet(&noise_null) {
         let frame = Frame::new(&quiet, &scene.schedule, &scene.loudness, &scene.residual_ng);
-        let pool = Pool::found(scene, library, &frame, &Bank::new(&frame, entries), quiet, stop)?;
+        let bank = Bank::new(&frame, entries);
+        let pool = Pool::found(scene, library, &frame, &bank.before(&frame.data), quiet, stop)?;
         let (more_listed, more_open) = pool.weigh(scene, entries, OWN_NOISE_QUIET, stop)?;
         merge(&mut listed, more_listed);
         merge(&mut open, more_open);
@@ -145,7 +146,7 @@ impl Pool {
         scene: &Scene,
         library: &Library,
         frame: &Frame,
-        bank: &Bank,
+        seen: &Seen,
         noise: [AxisNoise; 3],
         stop: Stop,
     ) -> Option<Self> {
@@ -155,7 +156,7 @@ impl Pool {
         let entries = &library.entries;
         let listed_ids: Vec<usize> = (0..library.listed).collect();
         let open_ids: Vec<usize> = (library.listed..entries.len()).collect();
-        let mut listed = search::grow(frame, bank, &listed_ids, vec![Set::default()], SET_MAX);
+        let mut listed = search::grow(frame, seen, &listed_ids, vec![Set::default()], SET_MAX);
         listed.retain(|s| !s.members.is_empty());
         if stop() {
             return None;
@@ -166,14 +167,14 @@ impl Pool {
         let mut opens: Vec<Set> = Vec::new();
         for seed in seeds {
             let size = seed.members.len() + 1;
-            let mut grown = search::grow(frame, bank, &open_ids, vec![seed], size);
+            let mut grown = search::grow(frame, seen, &open_ids, vec![seed], size);
             grown.retain(|s| library.is_open(s));
             grown.truncate(3);
             opens.extend(grown);
         }
         opens.sort_by(|a, b| b.score.total_cmp(&a.score));
         // An open form with what the catalogue adds to it.
-        let mut joined = search::grow(frame, bank, &listed_ids, opens.iter().take(2).cloned().collect(), 2);
+        let mut joined = search::grow(frame, seen, &listed_ids, opens.iter().take(2).cloned().collect(), 2);
         joined.retain(|s| library.is_open(s));
         opens.extend(joined.into_iter().take(4));
         search::distinct(&mut opens);
@@ -224,13 +225,14 @@ fn converged(
     for round in 0.. {
         let frame = Frame::new(&noise, &scene.schedule, &scene.loudness, &scene.residual_ng);
         let bank = Bank::new(&frame, entries);
+        let seen = bank.before(&frame.data);
         if round == 0 {
             let nothing = Set::default();
             let chosen = nothing.chosen(&frame);
             let ids: Vec<usize> = (0..entries.len()).collect();
-            singles = shared_work::map(&ids, |i| (*i, search::best_of_entry(&bank, *i, &chosen).0));
+            singles = shared_work::map(&ids, |i| (*i, search::best_of_entry(&seen, *i, &chosen).0));
         }
-        let pool = Pool::found(scene, library, &frame, &bank, noise, stop)?;
+        let pool = Pool::found(scene, library, &frame, &seen, noise, stop)?;
         let again = pool.top().filter(|top| top.score >= WORTH_A_REFIT && round < 2 && top.key() != best_key);
         let Some(top) = again else { return Some((pool, singles)) };
         best_key = top.key();

@@ -11,7 +11,7 @@ pub fn both<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> 
 }
 
 /// The result of each item, in their order.
-pub fn map<T: Sync, U: Send>(items: &[T], of: impl Fn(&T) -> U + Sync + Send) -> Vec<U> {
+pub fn map<'a, T: Sync, U: Send>(items: &'a [T], of: impl Fn(&'a T) -> U + Sync + Send) -> Vec<U> {
     items.par_iter().with_max_len(1).map(of).collect()
 }
 

@@ -99,12 +99,9 @@ impl Answer {
         self.effects.iter().map(|e| e.id.as_str()).collect()
     }
 
-    /// All sets reported: the named one, the alternatives, and those that cannot be told apart. What comes nearest where nothing is
-    /// claimed is none.
+    /// All sets reported: the named one, the alternatives, and those that cannot be told apart. Where nothing is claimed the alternatives
+    /// are what comes nearest.
     pub fn sets(&self) -> BTreeSet<BTreeSet<&str>> {
-        if self.verdict == "consistent" {
-            return BTreeSet::new();
-        }
         let others = self.alternatives.iter().map(|a| &a.effects).chain(&self.cannot_tell_apart);
         let others = others.map(|set| set.iter().map(String::as_str).collect());
         others.chain([self.named()]).filter(|set: &BTreeSet<&str>| !set.is_empty()).collect()

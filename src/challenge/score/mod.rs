@@ -96,6 +96,12 @@ fn rates(all: &[Pair]) -> Vec<Rate> {
         of(&plain(8.0, 12.0), &first, "  the same, identifiable, SNR 8 to 12", "97 %"),
         of(&plain(5.0, 8.0), &first, "  the same, identifiable, SNR 5 to 8", "80 %"),
         of(&|p| listed(p) && p.0.snr_min() >= 8.0, &inside, "truth inside the reported set, SNR 8 and more", "99.5 %"),
+        of(
+            &|p| listed(p) && p.0.snr_min() >= 8.0,
+            &|p| alarm(p) && inside(p),
+            "  the same, something being claimed",
+            "99.5 %",
+        ),
         of(&one_in(12.0, ALL), &exact, "exactly right, one effect, SNR 12 and more", "98 %"),
         of(
             &|p| p.0.kind == "two" && p.0.snr_min() >= 12.0,
@@ -216,7 +222,8 @@ mod tests {
             score(&[outcome("clean", None, 0.0, silent), outcome("one", Some("aerodynamic_drag"), 30.0, silent)]);
         assert_eq!(value(&score, "false alarm, clean"), (0, 1));
         assert_eq!(value(&score, "right first name, SNR 12 and more"), (0, 1));
-        assert_eq!(value(&score, "truth inside the reported set, SNR 8 and more"), (0, 1));
+        assert_eq!(value(&score, "truth inside the reported set, SNR 8 and more"), (1, 1));
+        assert_eq!(value(&score, "  the same, something being claimed"), (0, 1));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Bias follows the sensor temperature, perhaps late.
 
 use super::{Effect, Linear, Nonlinear, Shape, Theta};
-use crate::diagnose::measure::Measurement;
+use crate::diagnose::measure::window_means;
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -41,6 +41,5 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     if !(0.0..=LAG_S_MAX).contains(&theta[0]) {
         return None;
     }
-    let lagged = Measurement::new(&scene.grid_s, scene.clock_s(), theta[0]).apply(&scene.temperature_c);
-    Some(Shape::Scalar(lagged))
+    Some(Shape::Scalar(window_means(&scene.grid_s, &scene.temperature_c, scene.clock_s(), theta[0])))
 }

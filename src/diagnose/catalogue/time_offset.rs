@@ -1,7 +1,7 @@
 //! The recording's clock runs ahead: what happened at t is labelled t + offset.
 
 use super::{Effect, Nonlinear, Shape, Theta};
-use crate::diagnose::measure::Measurement;
+use crate::diagnose::measure::window_means;
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -37,9 +37,9 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     if theta[0].abs() > OFFSET_S_MAX {
         return None;
     }
-    let late =
-        Measurement::new(&scene.case.simulation.clock_s, scene.clock_s(), theta[0]).apply3(&scene.case.simulation.a_ng);
+    let simulation = &scene.case.simulation;
     Some(Shape::Fixed(std::array::from_fn(|k| {
-        late[k].iter().zip(&scene.simulated_ng[k]).map(|(a, b)| a - b).collect()
+        let late = window_means(&simulation.clock_s, &simulation.a_ng[k], scene.clock_s(), theta[0]);
+        late.iter().zip(&scene.simulated_ng[k]).map(|(a, b)| a - b).collect()
     })))
 }

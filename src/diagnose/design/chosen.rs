@@ -5,6 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::{Column, Frame};
 
 /// Normal equations of columns beside those chosen.
+#[derive(Clone)]
 pub struct Normal {
     a: DMatrix<f64>,
     y: DVector<f64>,
@@ -16,6 +17,31 @@ pub struct Normal {
 const WIDE: f64 = 0.03;
 
 impl Normal {
+    /// Of columns beside nothing, before no data.
+    pub fn of(columns: &[Column]) -> Self {
+        let n = columns.len();
+        let mut a = DMatrix::zeros(n, n);
+        for i in 0..n {
+            for j in 0..=i {
+                a[(i, j)] = columns[i].dot(&columns[j]);
+                a[(j, i)] = a[(i, j)];
+            }
+        }
+        let mean = DVector::from_iterator(n, columns.iter().map(|c| c.mean));
+        Self { a, y: DVector::zeros(n), mean }
+    }
+
+    /// The same columns, before data.
+    pub fn before(&self, columns: &[Column], data: &Column) -> Self {
+        let y = DVector::from_iterator(columns.len(), columns.iter().map(|c| c.dot(data)));
+        Self { y, ..self.clone() }
+    }
+
+    /// Log evidence gained by the first column at an amplitude of one.
+    pub fn gain_at_one(&self) -> f64 {
+        self.y[0] - 0.5 * self.a[(0, 0)]
+    }
+
     /// Log evidence gained by these columns, their prior sizes all multiplied by `scale`.
     pub fn gain(&self, scale: f64) -> f64 {
         let n = self.y.len();
@@ -83,6 +109,9 @@ impl Normal {
 /// Columns already chosen: what is left for one more.
 pub struct Chosen<'a> {
     columns: Vec<&'a Column>,
+    /// Of amplitude one.
+    fixed: Vec<&'a Column>,
+    /// Less those of amplitude one.
     data: Column,
     cholesky: Option<Cholesky<f64, Dyn>>,
     reduced: DVector<f64>,
@@ -92,7 +121,7 @@ pub struct Chosen<'a> {
 
 impl<'a> Chosen<'a> {
     /// Choose linear columns and columns of fixed amplitude one.
-    pub fn new(frame: &Frame, columns: Vec<&'a Column>, fixed: &[&Column]) -> Self {
+    pub fn new(frame: &Frame, columns: Vec<&'a Column>, fixed: &[&'a Column]) -> Self {
         let means = columns.iter().map(|c| c.mean).collect();
         Self::about(frame, columns, means, fixed)
     }
@@ -103,7 +132,7 @@ impl<'a> Chosen<'a> {
         Self::about(frame, columns, means, &[])
     }
 
-    fn about(frame: &Frame, columns: Vec<&'a Column>, means: Vec<f64>, fixed: &[&Column]) -> Self {
+    fn about(frame: &Frame, columns: Vec<&'a Column>, means: Vec<f64>, fixed: &[&'a Column]) -> Self {
         let mut data = frame.data.clone();
         for column in fixed {
             data = data.less(column, 1.0);
@@ -111,8 +140,9 @@ impl<'a> Chosen<'a> {
         let mut log_evidence =
             if fixed.is_empty() { 0.0 } else { 0.5 * (frame.data.dot(&frame.data) - data.dot(&data)) };
         let n = columns.len();
+        let fixed = fixed.to_vec();
         if n == 0 {
-            return Self { columns, data, cholesky: None, reduced: DVector::zeros(0), log_evidence };
+            return Self { columns, fixed, data, cholesky: None, reduced: DVector::zeros(0), log_evidence };
         }
         let mut a = DMatrix::identity(n, n);
         for i in 0..n {
@@ -131,13 +161,14 @@ impl<'a> Chosen<'a> {
             Cholesky::new(a + DMatrix::identity(n, n) * jitter)
         });
         let Some(cholesky) = cholesky else {
-            return Self { columns, data, cholesky: None, reduced: DVector::zeros(0), log_evidence: f64::NEG_INFINITY };
+            let log_evidence = f64::NEG_INFINITY;
+            return Self { columns, fixed, data, cholesky: None, reduced: DVector::zeros(0), log_evidence };
         };
         let reduced = cholesky.l_dirty().solve_lower_triangular(&y).unwrap_or_else(|| DVector::zeros(n));
         let means: f64 = means.iter().map(|mean| mean * mean).sum();
         let volume = (0..n).map(|i| cholesky.l_dirty()[(i, i)].ln()).sum::<f64>();
         log_evidence += 0.5 * (reduced.norm_squared() - means) - volume;
-        Self { columns, data, cholesky: Some(cholesky), reduced, log_evidence }
+        Self { columns, fixed, data, cholesky: Some(cholesky), reduced, log_evidence }
     }
 
     fn overlap(&self, column: &Column) -> DVector<f64> {
@@ -155,27 +186,30 @@ impl<'a> Chosen<'a> {
 
     /// The normal equations of more linear columns beside those chosen.
     pub fn normal(&self, columns: &[Column]) -> Normal {
-        let n = columns.len();
-        let overlaps: Vec<DVector<f64>> = columns.iter().map(|c| self.overlap(c)).collect();
-        let y = DVector::from_iterator(
-            n,
-            columns.iter().zip(&overlaps).map(|(c, o)| c.dot(&self.data) - o.dot(&self.reduced)),
-        );
-        let mut a = DMatrix::zeros(n, n);
-        for i in 0..n {
-            for j in 0..=i {
-                a[(i, j)] = columns[i].dot(&columns[j]) - overlaps[i].dot(&overlaps[j]);
-                a[(j, i)] = a[(i, j)];
-            }
-        }
-        let mean = DVector::from_iterator(n, columns.iter().map(|c| c.mean));
-        Normal { a, y, mean }
+        self.reduced(columns, Normal::of(columns).before(columns, &self.data))
     }
 
-    /// Log evidence gained by adding a column of fixed amplitude one.
-    pub fn gain_fixed(&self, column: &Column) -> f64 {
-        let overlap = self.overlap(column);
-        column.dot(&self.data) - overlap.dot(&self.reduced) - 0.5 * (column.dot(column) - overlap.dot(&overlap))
+    /// The same, from what they are before the data of the frame and beside nothing.
+    pub fn beside(&self, columns: &[Column], alone: &Normal) -> Normal {
+        let mut normal = alone.clone();
+        for column in &self.fixed {
+            normal.y.iter_mut().zip(columns).for_each(|(y, c)| *y -= c.dot(column));
+        }
+        self.reduced(columns, normal)
+    }
+
+    fn reduced(&self, columns: &[Column], mut normal: Normal) -> Normal {
+        if self.columns.is_empty() {
+            return normal;
+        }
+        let overlaps: Vec<DVector<f64>> = columns.iter().map(|c| self.overlap(c)).collect();
+        for (i, overlap) in overlaps.iter().enumerate() {
+            normal.y[i] -= overlap.dot(&self.reduced);
+            for (j, other) in overlaps.iter().enumerate() {
+                normal.a[(i, j)] -= overlap.dot(other);
+            }
+        }
+        normal
     }
 
     /// What is left of a column beside those chosen: its squared norm, and its product with what is left of the data.

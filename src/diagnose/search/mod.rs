@@ -15,7 +15,7 @@ pub use refine::refine;
 pub use weigh::{Left, Weighed, fit_noise, residual, weigh_with_own_noise};
 
 use super::catalogue::{Effect, LOG_PRIOR, Shape, Theta};
-use super::design::{Chosen, Column, Frame, OnAxis};
+use super::design::{Chosen, Column, Frame, Normal, OnAxis};
 use super::scene::{Axes, Scene};
 use crate::math::shared_work;
 
@@ -130,6 +130,14 @@ pub struct Bank<'a> {
     /// The entries.
     pub entries: &'a [Entry],
     points: Vec<Vec<Whitened>>,
+    /// The normal equations of each point alone.
+    alone: Vec<Vec<Normal>>,
+}
+
+/// A bank before data.
+pub struct Seen<'a> {
+    bank: &'a Bank<'a>,
+    alone: Vec<Vec<Normal>>,
 }
 
 /// Shapes at their points, whitened all at once.
@@ -170,8 +178,20 @@ impl<'a> Bank<'a> {
         let points: Vec<(Theta, &Shape, &Entry)> =
             entries.iter().flat_map(|e| e.points.iter().map(move |(theta, shape)| (*theta, shape, e))).collect();
         let mut whitened = whiten_all(frame, &points).into_iter();
-        let points = entries.iter().map(|e| whitened.by_ref().take(e.points.len()).collect()).collect();
-        Self { entries, points }
+        let points: Vec<Vec<Whitened>> =
+            entries.iter().map(|e| whitened.by_ref().take(e.points.len()).collect()).collect();
+        let alone = shared_work::map(&points, |points| points.iter().map(|p| Normal::of(&p.columns)).collect());
+        Self { entries, points, alone }
+    }
+
+    /// The same before data.
+    pub fn before(&self, data: &Column) -> Seen<'_> {
+        let entries: Vec<usize> = (0..self.points.len()).collect();
+        let before = |index: &usize| {
+            let points = self.points[*index].iter().zip(&self.alone[*index]);
+            points.map(|(p, alone)| alone.before(&p.columns, data)).collect()
+        };
+        Seen { bank: self, alone: shared_work::map(&entries, before) }
     }
 }
 
@@ -325,19 +345,19 @@ fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, m: &Member, theta: &The
 }
 
 /// The best way to add one entry to a chosen set: the score gained with priors, and the member.
-pub fn best_of_entry(bank: &Bank, index: usize, chosen: &Chosen) -> (f64, Member) {
-    let entry = &bank.entries[index];
-    let points = &bank.points[index];
+pub fn best_of_entry(seen: &Seen, index: usize, chosen: &Chosen) -> (f64, Member) {
+    let entry = &seen.bank.entries[index];
+    let points = &seen.bank.points[index];
     // An open form of one series acts on all axes or on one of them: a quarter each.
     let narrow = matches!((entry.family, &entry.points[0].1), (Family::Open(_), Shape::Scalar(_)));
     let scales = entry.scales();
     let mut ways: Vec<(f64, usize, Option<usize>, f64)> = Vec::with_capacity(points.len() * 8);
-    for (i, p) in points.iter().enumerate() {
+    for (i, (p, alone)) in points.iter().zip(&seen.alone[index]).enumerate() {
+        let normal = chosen.beside(&p.columns, alone);
         if p.fixed {
-            ways.push((chosen.gain_fixed(&p.columns[0]), i, None, 1.0));
+            ways.push((normal.gain_at_one(), i, None, 1.0));
             continue;
         }
-        let normal = chosen.normal(&p.columns);
         for &scale in scales {
             ways.push((normal.gain(scale), i, None, scale));
             if narrow {
@@ -374,26 +394,26 @@ pub fn distinct(sets: &mut Vec<Set>) {
 }
 
 /// Grow sets from `seeds` by one member each at a time, over the entries of `allowed`.
-pub fn grow(frame: &Frame, bank: &Bank, allowed: &[usize], seeds: Vec<Set>, size_max: usize) -> Vec<Set> {
+pub fn grow(frame: &Frame, seen: &Seen, allowed: &[usize], seeds: Vec<Set>, size_max: usize) -> Vec<Set> {
     let mut found: Vec<Set> = seeds.clone();
     let mut layer = seeds;
     for _ in 0..size_max {
-        let mut next: Vec<Set> = Vec::new();
-        for set in layer.iter().take(BEAM) {
-            let chosen = set.chosen(frame);
-            let more = |index: &usize| {
-                if set.members.iter().any(|m| m.entry == *index) || set.members.len() >= size_max {
-                    return None;
-                }
-                let (gain, member) = best_of_entry(bank, *index, &chosen);
-                let mut grown = set.clone();
-                grown.members.push(member);
-                grown.members.sort_by_key(|m| m.entry);
-                grown.score = set.score + gain + crowd(grown.members.len()) - crowd(set.members.len());
-                Some(grown)
-            };
-            next.extend(shared_work::map(allowed, more).into_iter().flatten());
-        }
+        let beam = &layer[..BEAM.min(layer.len())];
+        let chosen = shared_work::map(beam, |set| set.chosen(frame));
+        let ways: Vec<(&Set, &Chosen, usize)> =
+            beam.iter().zip(&chosen).flat_map(|(set, chosen)| allowed.iter().map(move |i| (set, chosen, *i))).collect();
+        let more = |(set, chosen, index): &(&Set, &Chosen, usize)| {
+            if set.members.iter().any(|m| m.entry == *index) || set.members.len() >= size_max {
+                return None;
+            }
+            let (gain, member) = best_of_entry(seen, *index, chosen);
+            let mut grown = Set::clone(set);
+            grown.members.push(member);
+            grown.members.sort_by_key(|m| m.entry);
+            grown.score = set.score + gain + crowd(grown.members.len()) - crowd(set.members.len());
+            Some(grown)
+        };
+        let mut next: Vec<Set> = shared_work::map(&ways, more).into_iter().flatten().collect();
         distinct(&mut next);
         let best = found.iter().map(|s| s.score).fold(f64::NEG_INFINITY, f64::max);
         next.truncate(FINALISTS.max(BEAM) * 2);

@@ -29,7 +29,8 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         let gain = |theta: &Theta| -> f64 {
             let Some(shape) = (effect.signature)(scene, theta) else { return f64::NEG_INFINITY };
             let point = whiten(frame, *theta, &shape, entry, scale);
-            if point.fixed { chosen.gain_fixed(&point.columns[0]) } else { chosen.gain(&point.columns) }
+            let normal = chosen.normal(&point.columns);
+            if point.fixed { normal.gain_at_one() } else { normal.gain(1.0) }
         };
         let start: Vec<f64> = free.iter().map(|j| theta[*j]).collect();
         let steps: Vec<f64> = free.iter().map(|j| effect.nonlinear[*j].step).collect();

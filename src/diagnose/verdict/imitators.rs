@@ -19,6 +19,7 @@ pub fn imitators(library: &Library, best: &Best) -> Vec<Rival> {
     let mut found = Vec::new();
     for (i, series) in best.contributions.iter().enumerate() {
         let frame = best.frame.with_data(series);
+        let seen = bank.before(&frame.data);
         let whole = frame.column(&full(series.clone()), 1.0);
         let others = best.set.without(i);
         let chosen = others.chosen_about_nothing(&frame);
@@ -26,7 +27,7 @@ pub fn imitators(library: &Library, best: &Best) -> Vec<Rival> {
             continue;
         }
         for index in (0..library.listed).filter(|index| !key.contains(index)) {
-            let imitation = search::imitation(&bank, index, &chosen, &whole);
+            let imitation = search::imitation(&seen, index, &chosen, &whole);
             if let Some((effect, imitation)) = imitation.filter(|(_, imitation)| imitation.left_snr < SAME_SNR) {
                 let mut rival = parts.clone();
                 rival[i] = Part { effect, theta: imitation.theta };

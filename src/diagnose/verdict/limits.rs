@@ -6,16 +6,18 @@ use crate::diagnose::scene::Scene;
 use crate::diagnose::search::{Family, Set};
 use crate::diagnose::solve::Library;
 use crate::math::rms::rms_about_mean;
+use crate::math::shared_work;
 
 /// 95 % limits on the size of every listed effect that is not claimed, beside what is.
 pub fn upper_limits(scene: &Scene, library: &Library, frame: &Frame, set: &Set) -> Vec<UpperLimit> {
     let chosen = set.chosen(frame);
     let n = scene.schedule.len() as f64;
-    let mut out = Vec::new();
-    for (index, entry) in library.entries[..library.listed].iter().enumerate() {
-        let Family::Listed(effect) = entry.family else { continue };
-        if set.members.iter().any(|m| m.entry == index) {
-            continue;
+    let listed: Vec<usize> = (0..library.listed).collect();
+    let limit = |index: &usize| {
+        let entry = &library.entries[*index];
+        let Family::Listed(effect) = entry.family else { return None };
+        if set.members.iter().any(|m| m.entry == *index) {
+            return None;
         }
         // A dozen of the starting points: the loosest of them is the limit.
         let stride = entry.points.len().div_ceil(12);
@@ -30,11 +32,10 @@ pub fn upper_limits(scene: &Scene, library: &Library, frame: &Frame, set: &Set) 
             value + 1.645 * sigma
         });
         let limit_ng = 300.0 * limits.fold(0.0, f64::max);
-        if limit_ng.is_finite() && n > 0.0 {
-            out.push(UpperLimit { id: effect.id.into(), limit_ng: (limit_ng * 100.0).round() / 100.0 });
-        }
-    }
-    out
+        (limit_ng.is_finite() && n > 0.0)
+            .then(|| UpperLimit { id: effect.id.into(), limit_ng: (limit_ng * 100.0).round() / 100.0 })
+    };
+    shared_work::map(&listed, limit).into_iter().flatten().collect()
 }
 
 /// Size and standard error of the largest of several columns beside those chosen, in units of their prior.

@@ -5,8 +5,8 @@ use crate::diagnose::answer::Alternative;
 use crate::diagnose::search::Weighed;
 use crate::diagnose::solve::Library;
 
-/// Posterior below which a set is not mentioned. By the tables of nulls one record of noise in thirty has such a set.
-const MENTION: f64 = 0.2;
+/// Posterior below which a set is not mentioned. By the tables of nulls one record of noise in twenty has such a set.
+const MENTION: f64 = 0.1;
 
 /// Sets of listed effects with their posterior beside that of nothing at all.
 pub fn nearest(library: &Library, null: &Weighed, listed: &[&Weighed]) -> Vec<Alternative> {
