@@ -211,7 +211,7 @@ async fn a_search_that_fails_is_told_and_the_next_one_answers() {
     let failed = running.wait_for_diagnosis("a failure", |d| d["progress"]["state"] == "failed").await;
     assert_eq!((&failed["verdict"], &failed["progress"]["searches"]), (&"consistent".into(), &0.into()), "{failed:#}");
     assert!(failed["progress"]["sentence"].as_str().unwrap().contains("failed"), "{failed:#}");
-    assert!(running.get("/accel").await["clock_s"].as_f64().is_some());
+    assert!(running.first_accel().await["clock_s"].as_f64().is_some());
     fails.store(false, Ordering::SeqCst);
     running.send(second).await;
     let named = running.wait_for_diagnosis("a name", |d| d["verdict"] == "explained").await;

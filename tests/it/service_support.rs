@@ -56,6 +56,20 @@ impl Running {
         answer.json().await.unwrap()
     }
 
+    /// The latest window, as soon as there is one.
+    pub async fn first_accel(&self) -> Value {
+        let start = Instant::now();
+        loop {
+            let answer = reqwest::get(self.url("/accel")).await.unwrap();
+            if answer.status() != 404 {
+                assert_eq!(answer.status(), 200, "/accel");
+                return answer.json().await.unwrap();
+            }
+            assert!(start.elapsed() < PATIENCE, "no window came");
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    }
+
     /// The status and the problem document of a request that must fail.
     pub async fn problem(&self, path: &str) -> (u16, Value) {
         problem_of(reqwest::get(self.url(path)).await.unwrap()).await
