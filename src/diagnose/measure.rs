@@ -14,12 +14,12 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Weights of `grid` for windows centred on `clock_s` less `ahead_s`: a clock that runs ahead labels late.
-    pub fn new(grid: &[f64], clock_s: &[f64], ahead_s: f64) -> Self {
+    /// Weights of `grid` for windows centred on `clock_s`.
+    pub fn new(grid: &[f64], clock_s: &[f64]) -> Self {
         let mut measurement = Self { first: Vec::with_capacity(clock_s.len()), start: vec![0], weight: Vec::new() };
         let mut cell = 0;
         for &centre in clock_s {
-            let [low, high] = [centre - ahead_s - HALF_WINDOW_S, centre - ahead_s + HALF_WINDOW_S];
+            let [low, high] = [centre - HALF_WINDOW_S, centre + HALF_WINDOW_S];
             while cell > 0 && grid[cell] > low {
                 cell -= 1;
             }
@@ -72,14 +72,10 @@ impl Measurement {
             })
             .collect()
     }
-
-    /// The same for the three axes.
-    pub fn apply3(&self, series: &[Vec<f64>; 3]) -> [Vec<f64>; 3] {
-        std::array::from_fn(|k| self.apply(&series[k]))
-    }
 }
 
-/// Window means as [`Measurement`] gives them, for one use: from the integral of the series, without weights.
+/// Window means as [`Measurement`] gives them, at any offset of the clock: one that runs ahead by `ahead_s` labels late. From the integral
+/// of the series, since weights serve one offset alone.
 pub fn window_means(grid: &[f64], series: &[f64], clock_s: &[f64], ahead_s: f64) -> Vec<f64> {
     let last = grid.len() - 1;
     let mut integral = Vec::with_capacity(grid.len());
@@ -170,7 +166,7 @@ mod tests {
     fn a_window_mean_of_a_line_is_its_value_at_the_centre_and_of_a_parabola_exceeds_it_as_the_trapezoid_does() {
         let grid: Vec<f64> = (0..50).map(|i| 20.0 * i as f64).collect();
         let clock = [100.0, 107.0, 400.0, 412.5];
-        let m = Measurement::new(&grid, &clock, 0.0);
+        let m = Measurement::new(&grid, &clock);
         let line: Vec<f64> = grid.iter().map(|t| 3.0 * t - 5.0).collect();
         for (value, t) in m.apply(&line).iter().zip(clock) {
             assert!((value - (3.0 * t - 5.0)).abs() < 1e-9, "{value} at {t}");
@@ -185,7 +181,8 @@ mod tests {
         let series: Vec<f64> = grid.iter().map(|t| 80.0 * (t / 900.0).sin() + t % 61.0).collect();
         let clock: Vec<f64> = (0..240).map(|i| 700.0 + 25.3 * f64::from(i)).collect();
         for ahead in [-590.0, -33.3, 0.0, 0.1, 610.0] {
-            let weighed = Measurement::new(&grid, &clock, ahead).apply(&series);
+            let shifted: Vec<f64> = clock.iter().map(|t| t - ahead).collect();
+            let weighed = Measurement::new(&grid, &shifted).apply(&series);
             let integrated = window_means(&grid, &series, &clock, ahead);
             assert!(weighed.iter().zip(&integrated).all(|(a, b)| (a - b).abs() < 1e-9), "{ahead}");
         }
@@ -195,8 +192,7 @@ mod tests {
     #[test]
     fn a_clock_ahead_labels_late() {
         let grid: Vec<f64> = (0..50).map(|i| 20.0 * i as f64).collect();
-        let m = Measurement::new(&grid, &[300.0], 40.0);
-        assert!((m.apply(&grid)[0] - 260.0).abs() < 1e-9);
+        assert!((window_means(&grid, &grid, &[300.0], 40.0)[0] - 260.0).abs() < 1e-9);
     }
 
     #[test]

@@ -196,8 +196,8 @@ impl<'a> Scene<'a> {
     /// The scene of a case in surroundings that are known already: those of its expectation.
     pub fn within(case: &'a Case, surroundings: Arc<Surroundings>) -> Self {
         let windows = &case.recording.clock_s;
-        let to_windows = Measurement::new(&case.simulation.clock_s, windows, 0.0);
-        let simulated_ng = to_windows.apply3(&case.simulation.a_ng);
+        let to_windows = Measurement::new(&case.simulation.clock_s, windows);
+        let simulated_ng = case.simulation.a_ng.each_ref().map(|series| to_windows.apply(series));
         let residual_ng =
             std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
         let asleep: Vec<bool> = coverage(windows, &case.spans("crew_sleep")).iter().map(|c| *c > 0.5).collect();
@@ -206,7 +206,7 @@ impl<'a> Scene<'a> {
             loudness: std::array::from_fn(|k| Loudness::of_crew(&case.recording.dev_ng[k], &asleep)),
             residual_ng,
             simulated_ng,
-            measurement: Measurement::new(&surroundings.grid_s, windows, 0.0),
+            measurement: Measurement::new(&surroundings.grid_s, windows),
             surroundings,
             case,
         }

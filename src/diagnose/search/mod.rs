@@ -134,7 +134,7 @@ pub struct Bank<'a> {
     alone: Vec<Vec<Normal>>,
 }
 
-/// A bank before data.
+/// A bank, and what its points have in common with data.
 pub struct Seen<'a> {
     bank: &'a Bank<'a>,
     alone: Vec<Vec<Normal>>,

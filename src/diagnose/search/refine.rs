@@ -81,10 +81,8 @@ fn follow(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set, i: usi
         }
         let moved = theta.iter().zip(&m.theta).zip(&entry.sizes).any(|((a, b), size)| (a - b).abs() > ARRIVED * size);
         let Some(point) = point_at(scene, frame, entry, m, &theta).filter(|_| moved) else { return };
-        let mut next = set.clone();
-        (next.members[i].theta, next.members[i].point) = (theta, point);
-        next.weigh(frame, entries);
-        *set = next;
+        (set.members[i].theta, set.members[i].point) = (theta, point);
+        set.weigh(frame, entries);
     }
 }
 
