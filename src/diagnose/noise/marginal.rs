@@ -7,7 +7,7 @@ use crate::math::shared_work;
 /// Amplitudes, ng, and correlation times, s, of the slow part over which it is marginalised: each about the middle of its share of
 /// an axis of logarithms.
 pub(super) const SLOW_AMPLITUDES_NG: [f64; 12] = [0.35, 0.7, 1.4, 2.8, 5.6, 8.0, 11.2, 16.0, 22.4, 32.0, 45.0, 64.0];
-pub(super) const SLOW_TIMES_S: [f64; 6] = [300.0, 650.0, 1400.0, 3000.0, 6500.0, 14_000.0];
+pub(super) const SLOW_TIMES_S: [f64; 6] = [300.0, 615.0, 1260.0, 2570.0, 5270.0, 10_800.0];
 /// The trial of hardly any slow noise: the smallest amplitude, of a time in the middle.
 const LEAST: usize = 4;
 /// Noises weighed side by side.

@@ -100,7 +100,7 @@ impl Schedule {
 /// Amplitude at which the prior of the slow part turns down, ng.
 const SLOW_PRIOR_NG: f64 = 10.0;
 /// Longest and shortest correlation time of the slow part, s.
-const SLOW_TAU_S: [f64; 2] = [300.0, 14_400.0];
+const SLOW_TAU_S: [f64; 2] = [300.0, 10_800.0];
 
 /// Log prior of the noise (densities in the logarithms of its parameters).
 fn log_prior(noise: &AxisNoise) -> f64 {
