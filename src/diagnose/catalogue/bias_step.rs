@@ -17,6 +17,7 @@ pub const EFFECT: Effect = Effect {
         unit: "s",
         log: false,
         step: 300.0,
+        jagged: true,
         range: [f64::NEG_INFINITY, f64::INFINITY],
     }],
     grid,

@@ -24,6 +24,7 @@ pub const EFFECT: Effect = Effect {
         unit: "s",
         log: false,
         step: 0.0,
+        jagged: false,
         range: [f64::NEG_INFINITY, f64::INFINITY],
     }],
     grid,

@@ -147,6 +147,8 @@ pub struct Nonlinear {
     pub log: bool,
     /// First step of its refinement, in its coordinate; 0 for a discrete one.
     pub step: f64,
+    /// The evidence along it is no parabola near its peak but changes with the noise of every window.
+    pub jagged: bool,
     /// Lowest and highest coordinate, where the scene does not say otherwise.
     pub range: [f64; 2],
 }

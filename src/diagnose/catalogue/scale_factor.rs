@@ -11,7 +11,7 @@ pub const EFFECT: Effect = Effect {
     source: "ground and flight calibrations differed by 3-14 %",
     mistaken_for: &["aerodynamic_drag"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 1.5, whole: false }],
-    nonlinear: &[Nonlinear { name: "axis", unit: "", log: false, step: 0.0, range: [0.0, 2.0] }],
+    nonlinear: &[Nonlinear { name: "axis", unit: "", log: false, step: 0.0, jagged: false, range: [0.0, 2.0] }],
     grid,
     log_volume,
     signature,

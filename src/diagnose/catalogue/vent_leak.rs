@@ -13,8 +13,15 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["bias_step", "bias_drift"],
     linear: &push(80.0, 3000.0),
     nonlinear: &[
-        Nonlinear { name: "onset_s", unit: "s", log: false, step: 300.0, range: [f64::NEG_INFINITY, f64::INFINITY] },
-        Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, range: [5.7, 11.5] },
+        Nonlinear {
+            name: "onset_s",
+            unit: "s",
+            log: false,
+            step: 300.0,
+            jagged: true,
+            range: [f64::NEG_INFINITY, f64::INFINITY],
+        },
+        Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, jagged: false, range: [5.7, 11.5] },
     ],
     grid,
     log_volume,

@@ -6,6 +6,7 @@
 
 mod imitate;
 mod refine;
+mod volume;
 mod weigh;
 
 use nalgebra::{DMatrix, DVector};

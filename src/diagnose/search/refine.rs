@@ -1,10 +1,8 @@
-//! The nonlinear parameters of a set: their best values, and the volume of their posterior; and where columns that are only nearly
-//! linear are taken.
+//! The nonlinear parameters of a set: their best values; and where columns that are only nearly linear are taken.
 
-use nalgebra::DMatrix;
-
+use super::volume::volume;
 use super::{Entry, Member, Set, point_at, whiten};
-use crate::diagnose::catalogue::{Effect, Theta};
+use crate::diagnose::catalogue::Theta;
 use crate::diagnose::design::Frame;
 use crate::diagnose::optimise::nelder_mead;
 use crate::diagnose::scene::Scene;
@@ -84,69 +82,4 @@ fn follow(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set, i: usi
         (set.members[i].theta, set.members[i].point) = (theta, point);
         set.weigh(frame, entries);
     }
-}
-
-/// Laplace volume of the nonlinear parameters around their peak against their prior's, and their standard errors.
-fn volume(
-    gain: &impl Fn(&Theta) -> f64,
-    theta: &Theta,
-    free: &[usize],
-    effect: &Effect,
-    log_volume: f64,
-    peak: f64,
-) -> (f64, Theta) {
-    let n = free.len();
-    let mut h: Vec<f64> = free.iter().map(|j| effect.nonlinear[*j].step * 0.1).collect();
-    // A wall on one side (a lag cannot be negative) is mirrored: the fall is counted on the open side.
-    let gain = |t: &Theta| {
-        let there = gain(t);
-        if there.is_finite() {
-            return there;
-        }
-        gain(&[2.0 * theta[0] - t[0], 2.0 * theta[1] - t[1]])
-    };
-    // Steps at which the evidence falls by about one half: neither rounding nor the far side.
-    for (a, j) in free.iter().enumerate() {
-        for _ in 0..14 {
-            let at = |sign: f64| {
-                let mut t = *theta;
-                t[*j] += sign * h[a];
-                gain(&t)
-            };
-            let drop = peak - 0.5 * (at(1.0) + at(-1.0));
-            if !drop.is_finite() || drop > 1.5 {
-                h[a] *= 0.6;
-            } else if drop < 0.25 {
-                h[a] *= 1.5;
-            } else {
-                break;
-            }
-        }
-    }
-    let at = |shifts: &[(usize, f64)]| {
-        let mut t = *theta;
-        shifts.iter().for_each(|(a, s)| t[free[*a]] += s * h[*a]);
-        gain(&t)
-    };
-    let mut hessian = DMatrix::zeros(n, n);
-    for a in 0..n {
-        hessian[(a, a)] = (2.0 * peak - at(&[(a, 1.0)]) - at(&[(a, -1.0)])).clamp(0.05, 1e6) / (h[a] * h[a]);
-        for b in 0..a {
-            let mixed = (at(&[(a, 1.0), (b, -1.0)]) + at(&[(a, -1.0), (b, 1.0)])
-                - at(&[(a, 1.0), (b, 1.0)])
-                - at(&[(a, -1.0), (b, -1.0)]))
-                / (4.0 * h[a] * h[b]);
-            let bound = 0.95 * (hessian[(a, a)] * hessian[(b, b)]).sqrt();
-            let mixed = if mixed.is_finite() { mixed.clamp(-bound, bound) } else { 0.0 };
-            hessian[(a, b)] = mixed;
-            hessian[(b, a)] = mixed;
-        }
-    }
-    let mut sigma = [0.0; 2];
-    let Some(inverse) = hessian.clone().try_inverse() else { return (0.0, sigma) };
-    for (a, j) in free.iter().enumerate() {
-        sigma[*j] = inverse[(a, a)].max(0.0).sqrt();
-    }
-    let log_laplace = 0.5 * (n as f64 * std::f64::consts::TAU.ln() - hessian.determinant().max(1e-300).ln());
-    ((log_laplace - log_volume).min(0.0), sigma)
 }
