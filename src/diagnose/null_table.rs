@@ -13,7 +13,7 @@
 const QUIET: f64 = 2.5;
 
 /// Statistic, and the share of quiet records of noise alone that reach it.
-const OF_QUIET: [(f64, f64); 12] = [
+const OF_QUIET: [(f64, f64); 13] = [
     (-6.5, 1.0),
     (-4.91, 0.95),
     (-4.36, 0.75),
@@ -24,8 +24,9 @@ const OF_QUIET: [(f64, f64); 12] = [
     (-1.72, 0.03),
     (-1.22, 0.02),
     (-0.61, 0.01),
-    (0.2, 0.005),
-    (1.35, 0.0018),
+    (0.2, 0.0058),
+    (1.35, 0.0026),
+    (2.4, 0.0014),
 ];
 /// The same of records with slow noise.
 const OF_SLOW: [(f64, f64); 12] = [
@@ -39,8 +40,8 @@ const OF_SLOW: [(f64, f64); 12] = [
     (-0.85, 0.03),
     (-0.41, 0.02),
     (0.34, 0.01),
-    (1.71, 0.005),
-    (2.4, 0.0022),
+    (1.71, 0.0032),
+    (2.4, 0.0011),
 ];
 
 /// Whether a record is quiet, from the log likelihood of slow noise in it above that of hardly any when nothing is left out. An effect
@@ -51,7 +52,7 @@ pub fn is_quiet(slow_evidence: f64) -> bool {
 
 /// Probability that a record of noise alone scores `statistic` or more, when slow noise is as likely in it as `slow_evidence` says.
 pub fn false_alarm_probability(statistic: f64, slow_evidence: f64) -> f64 {
-    let table = if is_quiet(slow_evidence) { &OF_QUIET } else { &OF_SLOW };
+    let table: &[(f64, f64)] = if is_quiet(slow_evidence) { &OF_QUIET } else { &OF_SLOW };
     if statistic <= table[0].0 {
         return 1.0;
     }
