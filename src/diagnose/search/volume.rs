@@ -115,7 +115,7 @@ mod tests {
         let parabola = |t: &Theta| 7.0 - 0.5 * (t[0] - 3.0).powi(2) / 16.0;
         let laplace = (std::f64::consts::TAU * 16.0).sqrt();
         let found = area(&parabola, &[3.0, 0.0], 0, 2.0, 7.0);
-        assert!((found / laplace).ln().abs() < 0.03, "{found} {laplace}");
+        assert!((found / laplace).ln().abs() < 0.05, "{found} {laplace}");
         // Beside the peak a plateau lower by one, twenty of its widths long.
         let jagged = |t: &Theta| if (3.0..83.0).contains(&t[0]) { parabola(t).max(6.0) } else { parabola(t) };
         let expected = laplace + 80.0 * (-1.0_f64).exp();
