@@ -5,9 +5,10 @@
 //! statistic reaches higher; so there are two tables, of records that are quiet (see [`is_quiet`]) and of the others. They are what
 //! 2,500 simulated records score in which nothing is missing, 1,442 of white and short noise at activity and 1,058 with slow noise of
 //! up to 30 ng and 5 min to 3 h beside it; 1,248 of them are quiet. `oare challenge --cases 1500 --seed 760000 --kinds clean,slow`
-//! prints the shares of some, `--cases 1000 --seed 720000` those of the others. The tables are made for their tails: the last share
-//! stands for two or three records, and beyond they fall as exp(-T), the bound of Ville for evidence ratios. Where the probability
-//! itself matters, ask for the bootstrap.
+//! prints the shares of some, `--cases 1000 --seed 720000` those of the others. The tables are made for their tails: the last shares of
+//! each are of 2,600 records more beside those (`--cases 1000` of seeds 950000 and 1000000, `--cases 400 --seed 1040000` with both kinds
+//! and with `--kinds slow`), the very last stands for three or four of some 2,500, and beyond they fall as exp(-T), the bound of Ville
+//! for evidence ratios. Where the probability itself matters, ask for the bootstrap.
 
 /// Log likelihood of slow noise, when nothing is left out, below which a record is quiet: half of the nulls are.
 const QUIET: f64 = 2.5;

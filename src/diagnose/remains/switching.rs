@@ -24,7 +24,7 @@ const WORTH_MORE_AXES: f64 = -10.0;
 const SMOOTH: [usize; 2] = [1, 4];
 
 /// Probability that a chain is as likely as the best slow noise where there is only noise: of three thousand records with 15 ng of slow
-/// noise six had one, and from there on they fell as the bound does. Some five times that (a test counts others).
+/// noise five had one, and from there on they fell as the bound does. Some five times that (a test counts others).
 const EQUAL: f64 = 1e-2;
 
 /// The axes that may switch together.
