@@ -1,6 +1,6 @@
 //! The bias steps at an instant and stays.
 
-use super::{Effect, Nonlinear, Shape, Theta, onsets, push};
+use super::{Effect, ONSET, Shape, Theta, onsets, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -12,14 +12,7 @@ pub const EFFECT: Effect = Effect {
     source: "electronic bias shifts were seen between calibrations",
     mistaken_for: &["vent_leak", "a trend of density"],
     linear: &push(60.0, 2000.0),
-    nonlinear: &[Nonlinear {
-        name: "onset_s",
-        unit: "s",
-        log: false,
-        step: 300.0,
-        jagged: true,
-        range: [f64::NEG_INFINITY, f64::INFINITY],
-    }],
+    nonlinear: &[ONSET],
     grid,
     log_volume,
     signature,

@@ -227,6 +227,16 @@ pub const fn push(size_ng: f64, size_max_ng: f64) -> [Linear; 3] {
     ]
 }
 
+/// An unlogged instant at which something begins.
+pub const ONSET: Nonlinear = Nonlinear {
+    name: "onset_s",
+    unit: "s",
+    log: false,
+    step: 300.0,
+    jagged: true,
+    range: [f64::NEG_INFINITY, f64::INFINITY],
+};
+
 /// Onsets at a spacing inside the record, away from its ends by `margin_s`.
 pub fn onsets(scene: &Scene, spacing_s: f64, margin_s: f64) -> Vec<f64> {
     let [start, end] = scene.span_s();

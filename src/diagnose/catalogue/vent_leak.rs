@@ -1,6 +1,6 @@
 //! A decaying push fixed in the body from an unlogged instant.
 
-use super::{Effect, Nonlinear, Shape, Theta, onsets, push};
+use super::{Effect, Nonlinear, ONSET, Shape, Theta, onsets, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -13,14 +13,7 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["bias_step", "bias_drift"],
     linear: &push(80.0, 3000.0),
     nonlinear: &[
-        Nonlinear {
-            name: "onset_s",
-            unit: "s",
-            log: false,
-            step: 300.0,
-            jagged: true,
-            range: [f64::NEG_INFINITY, f64::INFINITY],
-        },
+        ONSET,
         Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, jagged: false, range: [5.7, 11.5] },
     ],
     grid,

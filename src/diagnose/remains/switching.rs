@@ -23,8 +23,8 @@ const WORTH_MORE_AXES: f64 = -10.0;
 /// Bins over which a residual is smoothed to begin with.
 const SMOOTH: [usize; 2] = [1, 4];
 
-/// Probability that a chain is as likely as the best slow noise where there is only noise: of three thousand records with 15 ng of slow
-/// noise five had one, and from there on they fell as the bound does. Some five times that (a test counts others).
+/// Probability that a chain is as likely as the best slow noise where there is only noise: some two in a
+/// thousand records of strong slow noise have one, and from there on they fall as the bound does. Five times that; a test counts.
 const EQUAL: f64 = 1e-2;
 
 /// The axes that may switch together.

@@ -7,13 +7,14 @@ use nalgebra::DMatrix;
 
 use crate::diagnose::catalogue::{Effect, Theta};
 
-/// Log volume, never above that of the prior, and standard errors of the parameters `free` of an effect.
+/// Log of the share of the prior's volume, and standard errors, of the parameters `free` of an effect whose log evidence is `gain` and
+/// has its `peak` at `theta`.
 pub fn volume(
     gain: &impl Fn(&Theta) -> f64,
     theta: &Theta,
     free: &[usize],
     effect: &Effect,
-    log_volume: f64,
+    log_prior_volume: f64,
     peak: f64,
 ) -> (f64, Theta) {
     let n = free.len();
@@ -50,12 +51,12 @@ pub fn volume(
     for (a, j) in free.iter().enumerate() {
         sigma[*j] = inverse[(a, a)].max(0.0).sqrt();
     }
-    let mut log_volume_here = 0.5 * (n as f64 * std::f64::consts::TAU.ln() - hessian.determinant().max(1e-300).ln());
+    let mut log_volume = 0.5 * (n as f64 * std::f64::consts::TAU.ln() - hessian.determinant().max(1e-300).ln());
     for (a, j) in free.iter().enumerate().filter(|(_, j)| effect.nonlinear[**j].jagged) {
         let parabola = (std::f64::consts::TAU / hessian[(a, a)]).sqrt();
-        log_volume_here += (area(gain, theta, *j, h[a], peak) / parabola).ln();
+        log_volume += (area(gain, theta, *j, h[a], peak) / parabola).ln();
     }
-    ((log_volume_here - log_volume).min(0.0), sigma)
+    ((log_volume - log_prior_volume).min(0.0), sigma)
 }
 
 /// The step along coordinate `j` at which the evidence falls by about one half: neither rounding nor the far side.
@@ -79,7 +80,8 @@ fn half_down(gain: &impl Fn(&Theta) -> f64, theta: &Theta, j: usize, step: f64, 
     h
 }
 
-/// Steps away from the peak grow by so much, up to so many.
+/// Steps away from the peak begin at about a standard error and grow by so much, up to so many: a thousand standard errors, for the
+/// evidence of an onset that is hardly there never falls.
 const GROWTH: f64 = 1.4;
 const STEPS: usize = 18;
 /// Evidence that has fallen by this much adds nothing more.
