@@ -1,6 +1,6 @@
 //! Drag off by a fraction: drag coefficient, area or density wrong by a factor, or the whole term absent.
 
-use super::{Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     linear: &[Linear { name: "fraction", unit: "1", size: 0.5, size_max: 3.0, whole: false }],
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual points against the velocity in every attitude and scales with the modelled drag.",

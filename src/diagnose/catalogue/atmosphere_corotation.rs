@@ -1,6 +1,6 @@
 //! The atmosphere turns with the Earth: drag with co-rotation less drag without.
 
-use super::{Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     linear: &[Linear { name: "fraction", unit: "1", size: 0.7, size_max: 2.0, whole: true }],
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual has the cross-track part that a turning atmosphere gives, changing sign between ascending and descending passes, with a small loss of drag along the track.",

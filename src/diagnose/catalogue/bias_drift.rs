@@ -12,9 +12,9 @@ pub const EFFECT: Effect = Effect {
     source: "bias law of the flight report: time constants of 6 to 500 h",
     mistaken_for: &["vent_leak", "temperature_bias", "a trend of density"],
     linear: &push(150.0, 20000.0),
-    nonlinear: &[Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.2, jagged: false, range: [7.6, 13.5] }],
+    nonlinear: &[Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.2, range: [7.6, 13.5], ..Nonlinear::PLAIN }],
     grid,
-    log_volume,
+    log_density,
     signature,
     exact_at: None,
     why: "The bias of each sensor axis relaxes from the beginning of the record with one time constant, whatever the attitude does.",
@@ -29,8 +29,8 @@ fn grid(_: &Scene) -> Vec<Theta> {
         .to_vec()
 }
 
-fn log_volume(_: &Scene) -> f64 {
-    (TAU_RANGE_S[1] / TAU_RANGE_S[0]).ln().ln()
+fn log_density(_: &Scene, _: &Theta) -> f64 {
+    -(TAU_RANGE_S[1] / TAU_RANGE_S[0]).ln().ln()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {

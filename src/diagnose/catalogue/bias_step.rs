@@ -14,7 +14,7 @@ pub const EFFECT: Effect = Effect {
     linear: &push(60.0, 2000.0),
     nonlinear: &[ONSET],
     grid,
-    log_volume,
+    log_density,
     signature,
     exact_at: None,
     why: "Each sensor axis jumps once, at one instant, and stays there whatever the attitude does.",
@@ -24,9 +24,9 @@ fn grid(scene: &Scene) -> Vec<Theta> {
     onsets(scene, 900.0, 900.0).into_iter().map(|t| [t, 0.0]).collect()
 }
 
-fn log_volume(scene: &Scene) -> f64 {
+fn log_density(scene: &Scene, _: &Theta) -> f64 {
     let [start, end] = scene.span_s();
-    (end - start).ln()
+    -(end - start).ln()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {

@@ -2,7 +2,7 @@
 
 use crate::units::NANO_G_M_S2;
 
-use super::{Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -19,7 +19,7 @@ pub const EFFECT: Effect = Effect {
     ],
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual is linear in the gravity-gradient and rotation tensor: it changes with every attitude as a displaced sensor must, and a bias cannot.",

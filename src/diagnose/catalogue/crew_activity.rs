@@ -1,6 +1,6 @@
 //! A shift between sleep and wake, wake minus sleep.
 
-use super::{Effect, Shape, lasting, no_volume, one_point, push};
+use super::{Effect, Shape, lasting, no_density, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     linear: &push(20.0, 500.0),
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual shifts at the logged ends of the sleep periods and nowhere else.",

@@ -1,6 +1,6 @@
 //! Day-night variation of density: a_d cos psi, psi from the apex 30 degrees east of the Sun.
 
-use super::{Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 use crate::physics::bulge;
 
@@ -14,7 +14,7 @@ pub const EFFECT: Effect = Effect {
     linear: &[Linear { name: "amplitude", unit: "1", size: 0.4, size_max: 2.0, whole: false }],
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual lies along the drag, once per orbit, strongest when the vehicle passes the afternoon side: it follows the Sun and not the perigee.",

@@ -1,6 +1,6 @@
 //! A push while a logged event of kind `evaporator` lasts.
 
-use super::{Effect, Shape, lasting, no_volume, one_point, push};
+use super::{Effect, Shape, lasting, no_density, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     linear: &push(60.0, 1000.0),
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual is a push fixed in the body that begins and ends with the logged cycles of the evaporator.",

@@ -1,6 +1,6 @@
 //! The sensor feels the geomagnetic field: a = K B in body axes.
 
-use super::{Effect, Linear, Shape, no_volume, one_point};
+use super::{Effect, Linear, Shape, no_density, one_point};
 use crate::diagnose::design::Raw;
 use crate::diagnose::scene::Scene;
 
@@ -24,7 +24,7 @@ pub const EFFECT: Effect = Effect {
     ],
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual is linear in the geomagnetic field in body axes: it follows magnetic latitude, with the Earth turning below the orbit.",

@@ -2,7 +2,7 @@
 
 use crate::units::NANO_G_M_S2;
 
-use super::{Effect, Linear, Nonlinear, Shape, Theta};
+use super::{Effect, Linear, Nonlinear, Shape, Theta, no_density};
 use crate::diagnose::design::Raw;
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
@@ -19,16 +19,9 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "dy_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },
         Linear { name: "dz_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },
     ],
-    nonlinear: &[Nonlinear {
-        name: "onset_s",
-        unit: "s",
-        log: false,
-        step: 0.0,
-        jagged: false,
-        range: [f64::NEG_INFINITY, f64::INFINITY],
-    }],
+    nonlinear: &[Nonlinear { name: "onset_s", unit: "s", ..Nonlinear::PLAIN }],
     grid,
-    log_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual begins at a logged change of mass and follows the gravity-gradient and rotation tensor from there on: the centre of gravity moved.",
@@ -46,10 +39,6 @@ fn grid(scene: &Scene) -> Vec<Theta> {
         .filter(inside)
         .map(|t| [t, 0.0])
         .collect()
-}
-
-fn log_volume(scene: &Scene) -> f64 {
-    (grid(scene).len().max(1) as f64).ln()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {

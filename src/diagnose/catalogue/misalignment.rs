@@ -1,6 +1,6 @@
 //! The sensor's axes are turned by a small right-handed angle r: recorded = a + a x r.
 
-use super::{Effect, Linear, Shape, no_volume, one_point};
+use super::{Effect, Linear, Shape, no_density, one_point};
 use crate::diagnose::design::Raw;
 use crate::diagnose::scene::Scene;
 
@@ -18,7 +18,7 @@ pub const EFFECT: Effect = Effect {
     ],
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "What one axis should read leaks into the others with fixed small angles, in every attitude.",

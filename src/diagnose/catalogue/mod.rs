@@ -79,8 +79,8 @@ pub struct Effect {
     pub nonlinear: &'static [Nonlinear],
     /// Starting points over the whole prior range.
     pub grid: fn(&Scene) -> Vec<Theta>,
-    /// Log of the prior volume of `Theta` in its coordinates (of the number of points, if they are discrete).
-    pub log_volume: fn(&Scene) -> f64,
+    /// Log prior density of the parameters that are refined, in their coordinates, where they are not at their atom.
+    pub log_density: fn(&Scene, &Theta) -> f64,
     /// Its series at `Theta`, `None` where the case does not allow it (no such event, for one).
     pub signature: fn(&Scene, &Theta) -> Option<Shape>,
     /// Where its series is only nearly linear in its coefficients: the `Theta` whose columns are exact at these coefficients.
@@ -149,8 +149,23 @@ pub struct Nonlinear {
     pub step: f64,
     /// The evidence along it is no parabola near its peak but changes with the noise of every window.
     pub jagged: bool,
+    /// A value that has half of the prior to itself. Of an effect with this parameter alone.
+    pub atom: Option<f64>,
     /// Lowest and highest coordinate, where the scene does not say otherwise.
     pub range: [f64; 2],
+}
+
+impl Nonlinear {
+    /// What one is that has nothing of its own.
+    const PLAIN: Self = Self {
+        name: "",
+        unit: "",
+        log: false,
+        step: 0.0,
+        jagged: false,
+        atom: None,
+        range: [f64::NEG_INFINITY, f64::INFINITY],
+    };
 }
 
 /// The form of a signature.
@@ -210,8 +225,8 @@ pub fn one_point(_: &Scene) -> Vec<Theta> {
     vec![[0.0; 2]]
 }
 
-/// The volume of a single point.
-pub fn no_volume(_: &Scene) -> f64 {
+/// The density where nothing is refined.
+pub fn no_density(_: &Scene, _: &Theta) -> f64 {
     0.0
 }
 
@@ -228,14 +243,7 @@ pub const fn push(size_ng: f64, size_max_ng: f64) -> [Linear; 3] {
 }
 
 /// An unlogged instant at which something begins.
-pub const ONSET: Nonlinear = Nonlinear {
-    name: "onset_s",
-    unit: "s",
-    log: false,
-    step: 300.0,
-    jagged: true,
-    range: [f64::NEG_INFINITY, f64::INFINITY],
-};
+pub const ONSET: Nonlinear = Nonlinear { name: "onset_s", unit: "s", step: 300.0, jagged: true, ..Nonlinear::PLAIN };
 
 /// Onsets at a spacing inside the record, away from its ends by `margin_s`.
 pub fn onsets(scene: &Scene, spacing_s: f64, margin_s: f64) -> Vec<f64> {
@@ -277,6 +285,7 @@ mod tests {
             assert!(!e.linear.is_empty() || !e.nonlinear.is_empty(), "{} has nothing to fit", e.id);
             assert!(e.linear.iter().all(|l| l.size > 0.0 && l.size_max > 2.0 * l.size), "{}: sizes", e.id);
             assert!(e.nonlinear.len() <= 2, "{}", e.id);
+            assert!(e.nonlinear.len() == 1 || e.nonlinear.iter().all(|p| p.atom.is_none()), "{}", e.id);
             assert_eq!(by_id(e.id).map(|x| x.name), Some(e.name));
         }
     }

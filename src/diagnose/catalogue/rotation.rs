@@ -2,7 +2,7 @@
 
 use crate::units::NANO_G_M_S2;
 
-use super::{Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -15,7 +15,7 @@ pub const EFFECT: Effect = Effect {
     linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0, whole: true }],
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual follows the square of the body rates and their change at the assumed sensor position, largest in manoeuvres.",

@@ -1,6 +1,6 @@
 //! One axis reads (1 + fraction) times the truth.
 
-use super::{Effect, Linear, Nonlinear, Shape, Theta};
+use super::{Effect, Linear, Nonlinear, Shape, Theta, no_density};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -11,9 +11,9 @@ pub const EFFECT: Effect = Effect {
     source: "ground and flight calibrations differed by 3-14 %",
     mistaken_for: &["aerodynamic_drag"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 1.5, whole: false }],
-    nonlinear: &[Nonlinear { name: "axis", unit: "", log: false, step: 0.0, jagged: false, range: [0.0, 2.0] }],
+    nonlinear: &[Nonlinear { name: "axis", range: [0.0, 2.0], ..Nonlinear::PLAIN }],
     grid,
-    log_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "All the modelled physics of one axis is off by the same factor, gravity gradient and drag alike, and the other axes are not.",
@@ -21,10 +21,6 @@ pub const EFFECT: Effect = Effect {
 
 fn grid(_: &Scene) -> Vec<Theta> {
     vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]
-}
-
-fn log_volume(_: &Scene) -> f64 {
-    3.0_f64.ln()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {

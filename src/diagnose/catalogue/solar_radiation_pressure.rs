@@ -1,6 +1,6 @@
 //! Sunlight's push, none in shadow: a = -nu coefficient P (sum |s_i| area_i) / m s.
 
-use super::{Effect, Linear, Shape, full, no_volume, one_point};
+use super::{Effect, Linear, Shape, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 use crate::physics::solar_radiation;
 use crate::units::NANO_G_M_S2;
@@ -15,7 +15,7 @@ pub const EFFECT: Effect = Effect {
     linear: &[Linear { name: "coefficient", unit: "1", size: 4.0, size_max: 40.0, whole: false }],
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual points away from the Sun and switches at the edges of the shadow, without lag.",

@@ -19,13 +19,13 @@ pub const EFFECT: Effect = Effect {
     nonlinear: &[Nonlinear {
         name: "lag_s",
         unit: "s",
-        log: false,
         step: 200.0,
-        jagged: false,
+        atom: Some(0.0),
         range: [0.0, 28_800.0],
+        ..Nonlinear::PLAIN
     }],
     grid,
-    log_volume,
+    log_density,
     signature,
     exact_at: None,
     why: "The residual is proportional to the sensor temperature on every axis, swings with the daily and orbital cycle and lags as stated.",
@@ -40,8 +40,8 @@ fn grid(_: &Scene) -> Vec<Theta> {
         .to_vec()
 }
 
-fn log_volume(_: &Scene) -> f64 {
-    LAG_S_MAX.ln()
+fn log_density(_: &Scene, _: &Theta) -> f64 {
+    -LAG_S_MAX.ln()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {

@@ -4,7 +4,7 @@
 //! cross wind then shows more area whichever way it blows. So no one derivative serves. The columns are taken about a wind, exact
 //! there and to first order beside it, and the wind they are taken about follows the one fitted.
 
-use super::{Effect, Linear, Shape, Theta, full, no_volume};
+use super::{Effect, Linear, Shape, Theta, full, no_density};
 use crate::diagnose::scene::Scene;
 use crate::physics::Vec3;
 
@@ -21,7 +21,7 @@ pub const EFFECT: Effect = Effect {
     ],
     nonlinear: &[],
     grid: headings,
-    log_volume: no_volume,
+    log_density: no_density,
     signature: about,
     exact_at: Some(|wind_m_s| [wind_m_s[0], wind_m_s[1]]),
     why: "The residual is what a steady wind along and across the track does to the drag, of a speed that the thermosphere has.",

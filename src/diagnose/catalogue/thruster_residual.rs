@@ -1,6 +1,6 @@
 //! A push while a logged event of kind `thruster` lasts.
 
-use super::{Effect, Shape, added, no_volume, one_point, push};
+use super::{Effect, Shape, added, no_density, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     linear: &push(150.0, 3000.0),
     nonlinear: &[],
     grid: one_point,
-    log_volume: no_volume,
+    log_density: no_density,
     signature,
     exact_at: None,
     why: "The residual is a push fixed in the body that is there only while logged firings last.",

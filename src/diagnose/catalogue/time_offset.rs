@@ -12,16 +12,9 @@ pub const EFFECT: Effect = Effect {
     source: "under 1 ng per second in a hold, large in manoeuvres",
     mistaken_for: &["an attitude latency (the same)"],
     linear: &[],
-    nonlinear: &[Nonlinear {
-        name: "offset_s",
-        unit: "s",
-        log: false,
-        step: 3.0,
-        jagged: false,
-        range: [-600.0, 600.0],
-    }],
+    nonlinear: &[Nonlinear { name: "offset_s", unit: "s", step: 3.0, range: [-600.0, 600.0], ..Nonlinear::PLAIN }],
     grid,
-    log_volume,
+    log_density,
     signature,
     exact_at: None,
     why: "The recording shows the modelled signal late or early: the difference follows its time derivative, manoeuvres above all.",
@@ -36,8 +29,11 @@ fn grid(_: &Scene) -> Vec<Theta> {
     steps.iter().flat_map(|s| [[*s, 0.0], [-s, 0.0]]).collect()
 }
 
-fn log_volume(_: &Scene) -> f64 {
-    (2.0 * OFFSET_S_MAX).ln()
+/// Clocks are out by seconds, seldom by minutes: half of them by less than this, s.
+const OFFSET_S_USUAL: f64 = 20.0;
+
+fn log_density(_: &Scene, theta: &Theta) -> f64 {
+    -(std::f64::consts::PI * OFFSET_S_USUAL * (1.0 + (theta[0] / OFFSET_S_USUAL).powi(2))).ln()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {

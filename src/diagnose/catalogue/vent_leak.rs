@@ -14,10 +14,10 @@ pub const EFFECT: Effect = Effect {
     linear: &push(80.0, 3000.0),
     nonlinear: &[
         ONSET,
-        Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, jagged: false, range: [5.7, 11.5] },
+        Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, range: [5.7, 11.5], ..Nonlinear::PLAIN },
     ],
     grid,
-    log_volume,
+    log_density,
     signature,
     exact_at: None,
     why: "A push fixed in the body begins at an instant no log names and dies away exponentially, whatever the attitude does.",
@@ -36,9 +36,9 @@ fn grid(scene: &Scene) -> Vec<Theta> {
     TAUS_S.iter().flat_map(points).collect()
 }
 
-fn log_volume(scene: &Scene) -> f64 {
+fn log_density(scene: &Scene, _: &Theta) -> f64 {
     let [start, end] = scene.span_s();
-    ((end - start) * (TAU_RANGE_S[1] / TAU_RANGE_S[0]).ln()).ln()
+    -((end - start) * (TAU_RANGE_S[1] / TAU_RANGE_S[0]).ln()).ln()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {

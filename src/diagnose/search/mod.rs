@@ -53,8 +53,6 @@ pub struct Entry {
     pub family: Family,
     /// Log prior odds.
     pub log_prior: f64,
-    /// Log of the prior volume of the nonlinear parameters.
-    pub log_volume: f64,
     /// Starting points.
     pub points: Vec<(Theta, Shape)>,
     /// Prior sizes of the coefficients.
@@ -73,7 +71,6 @@ impl Entry {
         (!points.is_empty()).then(|| Self {
             family: Family::Listed(effect),
             log_prior: LOG_PRIOR,
-            log_volume: (effect.log_volume)(scene),
             points,
             sizes: effect.linear.iter().map(|l| l.prior().size).collect(),
             means: effect.linear.iter().map(|l| l.prior().mean).collect(),
@@ -90,7 +87,6 @@ impl Entry {
         Self {
             family: Family::Open(index),
             log_prior,
-            log_volume: 0.0,
             points: shapes.into_iter().enumerate().map(|(i, shape)| ([i as f64, 0.0], shape)).collect(),
             sizes,
             means: vec![0.0; count],

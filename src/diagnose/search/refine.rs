@@ -48,7 +48,7 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         if !peak.is_finite() {
             continue;
         }
-        let (log_occam, sigma) = volume(&gain, &theta, &free, effect, entry.log_volume, peak);
+        let (log_occam, sigma) = volume(&gain, &theta, &free, effect, (effect.log_density)(scene, &theta), peak);
         if let Some(point) = point_at(scene, frame, entry, &set.members[i], &theta) {
             let m = &mut set.members[i];
             let log_occam = log_occam - (entry.scales().len() as f64).ln();

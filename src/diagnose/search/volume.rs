@@ -1,20 +1,21 @@
 //! The volume of the posterior of nonlinear parameters about their peak, against that of their prior.
 //!
 //! By Laplace, the evidence falling as a parabola; but along an onset, where it is jagged: one window more or less before the step
-//! changes it by that window's noise, and several instants do nearly as well as the best. There it is summed.
+//! changes it by that window's noise, and several instants do nearly as well as the best. There it is summed. A value with half of
+//! the prior to itself (no lag at all) counts with it.
 
 use nalgebra::DMatrix;
 
 use crate::diagnose::catalogue::{Effect, Theta};
 
-/// Log of the share of the prior's volume, and standard errors, of the parameters `free` of an effect whose log evidence is `gain` and
-/// has its `peak` at `theta`.
+/// Log of the share of the prior's mass, whose log density at the peak is `log_density`, and standard errors, of the parameters `free` of an
+/// effect whose log evidence is `gain` and has its `peak` at `theta`.
 pub fn volume(
     gain: &impl Fn(&Theta) -> f64,
     theta: &Theta,
     free: &[usize],
     effect: &Effect,
-    log_prior_volume: f64,
+    log_density: f64,
     peak: f64,
 ) -> (f64, Theta) {
     let n = free.len();
@@ -56,18 +57,22 @@ pub fn volume(
         let parabola = (std::f64::consts::TAU / hessian[(a, a)]).sqrt();
         log_volume += (area(gain, theta, *j, h[a], peak) / parabola).ln();
     }
-    ((log_volume - log_prior_volume).min(0.0), sigma)
+    let log_share = (log_volume + log_density).min(0.0);
+    let atom = free.iter().find_map(|j| effect.nonlinear[*j].atom.map(|atom| gain(&with(theta, *j, atom)) - peak));
+    (atom.map_or(log_share, |atom| (0.5 * (atom.exp() + log_share.exp())).ln()), sigma)
+}
+
+fn with(theta: &Theta, j: usize, value: f64) -> Theta {
+    let mut theta = *theta;
+    theta[j] = value;
+    theta
 }
 
 /// The step along coordinate `j` at which the evidence falls by about one half: neither rounding nor the far side.
 fn half_down(gain: &impl Fn(&Theta) -> f64, theta: &Theta, j: usize, step: f64, peak: f64) -> f64 {
     let mut h = step * 0.1;
     for _ in 0..14 {
-        let at = |sign: f64| {
-            let mut t = *theta;
-            t[j] += sign * h;
-            gain(&t)
-        };
+        let at = |sign: f64| gain(&with(theta, j, theta[j] + sign * h));
         let drop = peak - 0.5 * (at(1.0) + at(-1.0));
         if !drop.is_finite() || drop > 1.5 {
             h *= 0.6;
@@ -123,5 +128,19 @@ mod tests {
         let expected = laplace + 80.0 * (-1.0_f64).exp();
         let found = area(&jagged, &[3.0, 0.0], 0, 2.0, 7.0);
         assert!((found / expected).ln().abs() < 0.25, "{found} {expected}");
+    }
+
+    #[test]
+    fn a_value_with_half_of_the_prior_counts_as_far_as_the_evidence_stands_there() {
+        let effect = &crate::diagnose::catalogue::temperature_bias::EFFECT;
+        let at = |lag: f64| {
+            let gain = |t: &Theta| 9.0 - 0.5 * ((t[0] - lag) / 50.0).powi(2);
+            volume(&gain, &[lag, 0.0], &[0], effect, -28_800.0_f64.ln(), 9.0).0
+        };
+        let elsewhere = 0.5 * (std::f64::consts::TAU.sqrt() * 50.0 / 28_800.0);
+        for lag in [0.0, 75.0, 2000.0] {
+            let expected = 0.5 * (-0.5 * (lag / 50.0_f64).powi(2)).exp() + elsewhere;
+            assert!((at(lag) - expected.ln()).abs() < 0.01, "{lag}: {} {}", at(lag), expected.ln());
+        }
     }
 }
