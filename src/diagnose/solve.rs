@@ -109,18 +109,17 @@ pub fn solve(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3]) -> So
 pub fn solve_unless(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3], stop: Stop) -> Option<Solution> {
     let entries = &library.entries;
     let null = search::weigh_with_own_noise(scene, entries, &Set::default(), &noise_null, 0, 0);
-    let (pool, singles) = converged(scene, library, &noise_null, stop)?;
-    let (mut listed, mut open) = pool.weigh(scene, entries, OWN_NOISE, stop)?;
-    // What the null takes for slow noise may be a slow effect: looked for a second time as if there were no slow noise. Each
-    // candidate is weighed with the noise of its own residual as all are.
-    if let Some(quiet) = quiet(&noise_null) {
-        let frame = Frame::new(&quiet, &scene.schedule, &scene.loudness, &scene.residual_ng);
-        let bank = Bank::new(&frame, entries);
-        let pool = Pool::found(scene, library, &frame, &bank.before(&frame.data), quiet, stop)?;
-        let (more_listed, more_open) = pool.weigh(scene, entries, OWN_NOISE_QUIET, stop)?;
-        merge(&mut listed, more_listed);
-        merge(&mut open, more_open);
-    }
+    let (found, more) = shared_work::both(
+        || {
+            let (pool, singles) = converged(scene, library, &noise_null, stop)?;
+            Some((pool.weigh(scene, entries, OWN_NOISE, stop)?, singles))
+        },
+        || quietly(scene, library, &noise_null, stop),
+    );
+    let ((mut listed, mut open), singles) = found?;
+    let (more_listed, more_open) = more?;
+    merge(&mut listed, more_listed);
+    merge(&mut open, more_open);
     lessen(scene, entries, &mut listed, stop)?;
     Some(Solution { listed, open, null, singles })
 }
@@ -133,6 +132,19 @@ fn quiet(noise: &[AxisNoise; 3]) -> Option<[AxisNoise; 3]> {
         .any(|n| n.slow_ng > 2.0 * level(n))
         .then(|| noise.map(|n| AxisNoise { slow_ng: n.slow_ng.min(level(&n)), slow_tau_s: QUIET_TAU_S, ..n }))
 }
+
+/// What the null takes for slow noise may be a slow effect: listed and open sets found as if there were no slow noise, each then
+/// weighed with the noise of its own residual as all are.
+fn quietly(scene: &Scene, library: &Library, noise_null: &[AxisNoise; 3], stop: Stop) -> Option<Kinds> {
+    let Some(quiet) = quiet(noise_null) else { return Some(Kinds::default()) };
+    let frame = Frame::new(&quiet, &scene.schedule, &scene.loudness, &scene.residual_ng);
+    let bank = Bank::new(&frame, &library.entries);
+    let pool = Pool::found(scene, library, &frame, &bank.before(&frame.data), quiet, stop)?;
+    pool.weigh(scene, &library.entries, OWN_NOISE_QUIET, stop)
+}
+
+/// Weighed hypotheses, listed and open, each kind best first.
+type Kinds = (Vec<Weighed>, Vec<Weighed>);
 
 /// Sets found at one noise, each kind best first.
 struct Pool {
@@ -186,13 +198,7 @@ impl Pool {
     }
 
     /// The best of each kind, each weighed with its own noise, best first.
-    fn weigh(
-        self,
-        scene: &Scene,
-        entries: &[Entry],
-        count: [usize; 2],
-        stop: Stop,
-    ) -> Option<(Vec<Weighed>, Vec<Weighed>)> {
+    fn weigh(self, scene: &Scene, entries: &[Entry], count: [usize; 2], stop: Stop) -> Option<Kinds> {
         let weigh = |sets: Vec<Set>, count: usize| -> Option<Vec<Weighed>> {
             let top = sets.first().map_or(0.0, |s| s.score);
             let worth = top > WORTH_A_REFIT;

@@ -20,5 +20,5 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    lasting(scene, "crew_sleep").map(|asleep| Shape::Scalar(asleep.iter().map(|s| 1.0 - s).collect()))
+    lasting(scene, "crew_sleep").map(|asleep| Shape::scalar(&asleep.iter().map(|s| 1.0 - s).collect::<Vec<f64>>()))
 }

@@ -20,5 +20,5 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    lasting(scene, "evaporator").map(Shape::Scalar)
+    lasting(scene, "evaporator").map(|series| Shape::scalar(&series))
 }

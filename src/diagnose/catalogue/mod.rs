@@ -4,6 +4,7 @@
 //! coefficient may have) at given values of its nonlinear parameters. It searches nothing.
 
 use super::design::{OnAxis, Raw};
+use super::noise::Stretch;
 use super::scene::{Axes, Scene};
 
 pub mod aerodynamic_drag;
@@ -172,7 +173,14 @@ impl Nonlinear {
 #[derive(Debug, Clone)]
 pub enum Shape {
     /// One series, with a coefficient for every body axis.
-    Scalar(Vec<f64>),
+    Scalar {
+        /// Number of its windows.
+        windows: usize,
+        /// First of them in which it is not zero.
+        first: usize,
+        /// Its values from there to the last that is not zero.
+        values: Vec<f64>,
+    },
     /// One series triple a coefficient.
     Columns(Vec<Raw>),
     /// A series whose amplitude is given by `Theta` alone.
@@ -180,10 +188,18 @@ pub enum Shape {
 }
 
 impl Shape {
+    /// One series, with a coefficient for every body axis.
+    pub fn scalar(series: &[f64]) -> Self {
+        let Stretch { first, values } = Stretch::of(series);
+        Shape::Scalar { windows: series.len(), first, values: values.to_vec() }
+    }
+
     /// As columns; a fixed shape is one column.
     pub fn columns(&self) -> Vec<Raw> {
         match self {
-            Shape::Scalar(series) => {
+            Shape::Scalar { windows, first, values } => {
+                let mut series = vec![0.0; *windows];
+                series[*first..first + values.len()].copy_from_slice(values);
                 (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| series.clone()))).collect()
             }
             Shape::Columns(columns) => columns.clone(),
@@ -196,7 +212,8 @@ impl Shape {
     /// The series of every column on the axes it acts on, of sizes times `scale`; a fixed shape is one column of size 1.
     pub fn on_axes(&self, sizes: &[f64], scale: f64) -> Vec<Vec<OnAxis<'_>>> {
         match self {
-            Shape::Scalar(series) => {
+            Shape::Scalar { first, values, .. } => {
+                let series = Stretch { first: *first, values };
                 (0..3).map(|axis| vec![OnAxis { axis, series, size: scale * sizes[axis] }]).collect()
             }
             Shape::Columns(columns) => columns
@@ -205,11 +222,14 @@ impl Shape {
                 .map(|(raw, size)| {
                     let size = scale * size;
                     let on_axes = raw.iter().enumerate();
-                    on_axes.filter_map(|(axis, s)| Some(OnAxis { axis, series: s.as_ref()?, size })).collect()
+                    on_axes
+                        .filter_map(|(axis, s)| Some(OnAxis { axis, series: Stretch::of(s.as_ref()?), size }))
+                        .collect()
                 })
                 .collect(),
             Shape::Fixed(axes) => {
-                vec![axes.iter().enumerate().map(|(axis, series)| OnAxis { axis, series, size: 1.0 }).collect()]
+                let on_axes = axes.iter().enumerate();
+                vec![on_axes.map(|(axis, s)| OnAxis { axis, series: Stretch::of(s), size: 1.0 }).collect()]
             }
         }
     }

@@ -48,5 +48,5 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     if !(0.0..=LAG_S_MAX).contains(&theta[0]) {
         return None;
     }
-    Some(Shape::Scalar(window_means(&scene.grid_s, &scene.temperature_c, scene.clock_s(), theta[0])))
+    Some(Shape::scalar(&window_means(&scene.grid_s, &scene.temperature_c, scene.clock_s(), theta[0])))
 }

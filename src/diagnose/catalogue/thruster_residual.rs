@@ -20,5 +20,5 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    added(scene, "thruster").map(Shape::Scalar)
+    added(scene, "thruster").map(|series| Shape::scalar(&series))
 }

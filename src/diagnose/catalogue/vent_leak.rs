@@ -45,5 +45,5 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let [start, end] = scene.span_s();
     let inside =
         theta[0] > start && theta[0] < end - 300.0 && theta[1] > TAU_RANGE_S[0].ln() && theta[1] < TAU_RANGE_S[1].ln();
-    inside.then(|| Shape::Scalar(decay(scene.clock_s(), theta[0], theta[1].exp())))
+    inside.then(|| Shape::scalar(&decay(scene.clock_s(), theta[0], theta[1].exp())))
 }

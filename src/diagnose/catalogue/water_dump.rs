@@ -20,5 +20,5 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    lasting(scene, "water_dump").map(Shape::Scalar)
+    lasting(scene, "water_dump").map(|series| Shape::scalar(&series))
 }

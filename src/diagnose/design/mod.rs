@@ -16,7 +16,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 pub use chosen::{Chosen, Normal};
 
-use crate::diagnose::noise::{AxisNoise, Loudness, Schedule, Whitener, dot};
+use crate::diagnose::noise::{AxisNoise, Loudness, Schedule, Stretch, Whitener, dot};
 use crate::diagnose::scene::Axes;
 use crate::math::shared_work;
 
@@ -27,7 +27,8 @@ pub type Raw = [Option<Vec<f64>>; 3];
 #[derive(Debug, Clone)]
 struct Part {
     first: usize,
-    whitened: Arc<Vec<f64>>,
+    /// In single precision: a bank of them is read many times over, and what rounding takes is 1e-7 of the noise.
+    whitened: Arc<Vec<f32>>,
     /// Its products with what is nuisance on this axis.
     nuisance: Vec<f64>,
     factor: f64,
@@ -85,14 +86,20 @@ impl Column {
             let mut whitened = vec![0.0; end - first];
             let mut nuisance = vec![0.0; b.nuisance.len()];
             let mut add = |part: &Part, factor: f64| {
-                whitened[part.first - first..].iter_mut().zip(&*part.whitened).for_each(|(x, y)| *x += factor * y);
+                let values = part.whitened.iter().map(|y| f64::from(*y));
+                whitened[part.first - first..].iter_mut().zip(values).for_each(|(x, y)| *x += factor * y);
                 nuisance.iter_mut().zip(&part.nuisance).for_each(|(x, y)| *x += factor * y);
             };
             if let Some(a) = &*a {
                 add(a, a.factor);
             }
             add(b, -factor * b.factor);
-            *a = Some(Part { first, whitened: Arc::new(whitened), nuisance, factor: 1.0 });
+            *a = Some(Part {
+                first,
+                whitened: Arc::new(whitened.iter().map(|x| *x as f32).collect()),
+                nuisance,
+                factor: 1.0,
+            });
         }
         out
     }
@@ -101,7 +108,7 @@ impl Column {
     pub fn projected(&self, axis: usize, frame: &Frame) -> Vec<f64> {
         let Some(p) = &self.parts[axis] else { return vec![0.0; frame.windows()] };
         let mut values = vec![0.0; frame.windows()];
-        values[p.first..p.first + p.whitened.len()].copy_from_slice(&p.whitened);
+        values[p.first..].iter_mut().zip(&*p.whitened).for_each(|(x, w)| *x = f64::from(*w));
         for (series, product) in frame.nuisance[axis].iter().zip(&p.nuisance) {
             values.iter_mut().zip(series).for_each(|(x, u)| *x -= product * u);
         }
@@ -115,8 +122,8 @@ impl Column {
 pub struct OnAxis<'a> {
     /// The body axis.
     pub axis: usize,
-    /// The series at the windows.
-    pub series: &'a [f64],
+    /// The series.
+    pub series: Stretch<'a>,
     /// Its prior size.
     pub size: f64,
 }
@@ -132,12 +139,6 @@ impl Column {
         }
         column
     }
-}
-
-/// First window in which a series is not zero, and one past the last.
-fn span(series: &[f64]) -> [usize; 2] {
-    let first = series.iter().position(|x| *x != 0.0).unwrap_or(series.len());
-    [first, series.iter().rposition(|x| *x != 0.0).map_or(first, |i| i + 1)]
 }
 
 /// The noise of all axes turned into filters, and the data behind them.
@@ -203,51 +204,48 @@ impl Frame {
 
     /// Whiten a regressor, scaled by its prior size.
     pub fn column(&self, raw: &Raw, size: f64) -> Column {
-        if let [Some(x), Some(y), Some(z)] = raw
-            && [x, y, z].into_iter().all(|series| span(series) == [0, series.len()])
+        let [x, y, z] = raw.each_ref().map(|series| series.as_ref().map(|series| Stretch::of(series)));
+        if let (Some(x), Some(y), Some(z)) = (x, y, z)
+            && [x, y, z].iter().all(|series| series.values.len() == self.windows())
         {
-            let whitened = Whitener::whiten_three(&self.whiteners, [x, y, z]);
+            let whitened = Whitener::whiten_three(&self.whiteners, [x.values, y.values, z.values]);
             return Column::of(whitened.into_iter().enumerate().map(|(k, w)| (k, self.part(k, 0, w, size))));
         }
-        let on_axes = raw.iter().enumerate().filter_map(|(axis, series)| Some((axis, series.as_ref()?)));
+        let on_axes = [x, y, z].into_iter().enumerate().filter_map(|(axis, series)| Some((axis, series?)));
         Column::of(on_axes.map(|(axis, series)| {
-            let span = span(series);
-            let [whitened] = self.whiteners[axis].whiten_spans([series], [span]);
-            (axis, self.part(axis, span[0], whitened, size))
+            let [whitened] = self.whiteners[axis].whiten_stretches([series]);
+            (axis, self.part(axis, series.first, whitened, size))
         }))
     }
 
     /// Whiten many regressors, each by its series on the axes it acts on: those of an axis side by side.
     pub fn columns(&self, many: &[Vec<OnAxis>]) -> Vec<Column> {
-        let spans: Vec<Vec<[usize; 2]>> =
-            shared_work::map(many, |parts| parts.iter().map(|part| span(part.series)).collect());
-        let flat: Vec<(usize, OnAxis, [usize; 2])> = many
-            .iter()
-            .zip(spans)
-            .enumerate()
-            .flat_map(|(owner, (parts, spans))| parts.iter().zip(spans).map(move |(part, span)| (owner, *part, span)))
-            .collect();
+        let flat: Vec<(usize, OnAxis)> =
+            many.iter().enumerate().flat_map(|(owner, parts)| parts.iter().map(move |part| (owner, *part))).collect();
         let mut order: Vec<usize> = (0..flat.len()).collect();
-        order.sort_by_key(|i| (flat[*i].1.axis, flat[*i].2));
+        order.sort_by_key(|i| {
+            let OnAxis { axis, series, .. } = flat[*i].1;
+            (axis, series.first, series.values.len())
+        });
         let groups: Vec<&[usize]> =
             order.chunk_by(|a, b| flat[*a].1.axis == flat[*b].1.axis).flat_map(|axis| axis.chunks(LANES)).collect();
         let parts = shared_work::map(&groups, |group| {
             // A group that is not full whitens its first series again in the lanes left over.
-            let lanes: [usize; LANES] = std::array::from_fn(|l| group[if l < group.len() { l } else { 0 }]);
-            let axis = flat[group[0]].1.axis;
-            let whitened = self.whiteners[axis].whiten_spans(lanes.map(|i| flat[i].1.series), lanes.map(|i| flat[i].2));
+            let lanes: [OnAxis; LANES] = std::array::from_fn(|l| flat[group[if l < group.len() { l } else { 0 }]].1);
+            let axis = lanes[0].axis;
+            let whitened = self.whiteners[axis].whiten_stretches(lanes.map(|lane| lane.series));
             let whitened = lanes.into_iter().zip(whitened).take(group.len());
-            whitened.map(|(i, w)| self.part(axis, flat[i].2[0], w, flat[i].1.size)).collect::<Vec<Part>>()
+            whitened.map(|(lane, w)| self.part(axis, lane.series.first, w, lane.size)).collect::<Vec<Part>>()
         });
         let mut columns = vec![Column::default(); many.len()];
         for (i, part) in order.iter().zip(parts.into_iter().flatten()) {
-            let (owner, OnAxis { axis, .. }, _) = flat[*i];
+            let (owner, OnAxis { axis, .. }) = flat[*i];
             columns[owner].parts[axis] = Some(part);
         }
         columns
     }
 
-    fn part(&self, axis: usize, first: usize, whitened: Vec<f64>, size: f64) -> Part {
+    fn part(&self, axis: usize, first: usize, whitened: Vec<f32>, size: f64) -> Part {
         let products = self.nuisance[axis].iter();
         let nuisance = products.map(|u| dot(&whitened, &u[first..first + whitened.len()])).collect();
         Part { first, whitened: Arc::new(whitened), nuisance, factor: size }
@@ -255,7 +253,7 @@ impl Frame {
 
     /// Whiten a scalar on one axis.
     pub fn scalar(&self, axis: usize, series: &[f64], size: f64) -> Column {
-        self.columns(&[vec![OnAxis { axis, series, size }]]).swap_remove(0)
+        self.columns(&[vec![OnAxis { axis, series: Stretch::of(series), size }]]).swap_remove(0)
     }
 }
 

@@ -5,7 +5,7 @@
 use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
 
-use super::{AxisNoise, Loudness, Schedule};
+use super::{AxisNoise, Loudness, Schedule, Stretch};
 
 /// Gains of whitening filters side by side, one row a window.
 #[derive(Debug, Clone, Copy)]
@@ -160,19 +160,19 @@ fn whiten_chunk<const L: usize>(memory: &mut Memory<L>, rows: &[Row<1>], values:
 /// Where what a filter remembers of a series is negligible.
 struct Tail {
     last: usize,
-    largest: f64,
+    largest: f32,
     quiet: usize,
     end: Option<usize>,
 }
 
 impl Tail {
-    fn new([first, last]: [usize; 2]) -> Self {
+    fn new(series: Stretch) -> Self {
         // Of a series of zeros nothing is remembered.
-        Self { last, largest: 0.0, quiet: 0, end: (first >= last).then_some(first) }
+        Self { last: series.end(), largest: 0.0, quiet: 0, end: series.values.is_empty().then_some(series.first) }
     }
 
     /// Goes on over innovations, the first of which is that of window `at`.
-    fn follow(&mut self, innovations: &[f64], at: usize) {
+    fn follow(&mut self, innovations: &[f32], at: usize) {
         let inside = self.last.saturating_sub(at).min(innovations.len());
         for w in &innovations[..inside] {
             let w = w.abs();
@@ -227,28 +227,30 @@ impl Whitener {
         self.rows.iter().zip(series).flat_map(|(row, x)| memory.whiten(row, [*x])).collect()
     }
 
-    /// Whitened innovations of several series, which are zero outside their own span of windows (first, and one past the last).
-    /// Each answer starts at the first window of its span and ends where what the filter remembers is negligible (1e-5 of its
-    /// largest value).
+    /// Whitened innovations of several series, in single precision. Each answer starts at the first window of its stretch and ends
+    /// where what the filter remembers is negligible (1e-5 of its largest value).
     ///
     /// Side by side, because one after the other waits for itself: every step of a filter needs the one before.
-    pub fn whiten_spans<const L: usize>(&self, series: [&[f64]; L], spans: [[usize; 2]; L]) -> [Vec<f64>; L] {
+    pub fn whiten_stretches<const L: usize>(&self, series: [Stretch; L]) -> [Vec<f32>; L] {
         let n = self.rows.len();
-        let begin = spans.iter().map(|span| span[0]).min().unwrap_or(0).min(n);
-        let rest = spans.iter().map(|span| span[1]).max().unwrap_or(n);
-        let series = series.map(|s| &s[..n]);
+        let begin = series.iter().map(|s| s.first).min().unwrap_or(0).min(n);
+        let rest = series.iter().map(Stretch::end).max().unwrap_or(n);
         let mut memory = Memory::new();
-        let mut out: [Vec<f64>; L] = std::array::from_fn(|_| Vec::with_capacity(n - begin));
-        let mut tails = spans.map(Tail::new);
+        let mut out: [Vec<f32>; L] = std::array::from_fn(|_| Vec::with_capacity(n - begin));
+        let mut tails = series.map(Tail::new);
         for chunk in (begin..n).step_by(CHUNK) {
             let end = (chunk + CHUNK).min(n);
             let mut values = [[0.0; L]; CHUNK];
             for (l, series) in series.iter().enumerate() {
-                values.iter_mut().zip(&series[chunk..end]).for_each(|(value, x)| value[l] = *x);
+                let (from, to) = (series.first.max(chunk), series.end().min(end));
+                if from < to {
+                    let inside = &series.values[from - series.first..to - series.first];
+                    values[from - chunk..].iter_mut().zip(inside).for_each(|(value, x)| value[l] = *x);
+                }
             }
             whiten_chunk(&mut memory, &self.rows[chunk..end], &mut values);
             for (l, out) in out.iter_mut().enumerate() {
-                out.extend(values[..end - chunk].iter().map(|value| value[l]));
+                out.extend(values[..end - chunk].iter().map(|value| value[l] as f32));
             }
             for (tail, out) in tails.iter_mut().zip(&out).filter(|(tail, _)| tail.last < n) {
                 tail.follow(&out[chunk - begin..], chunk);
@@ -259,22 +261,23 @@ impl Whitener {
         }
         for (l, out) in out.iter_mut().enumerate() {
             out.truncate(tails[l].end.unwrap_or(n).max(begin) - begin);
-            out.drain(..(spans[l][0].min(n) - begin).min(out.len()));
+            out.drain(..(series[l].first.min(n) - begin).min(out.len()));
             out.shrink_to_fit();
         }
         out
     }
 
-    /// Three whole series, each with a filter of its own, in one pass.
-    pub fn whiten_three(filters: &[Whitener; 3], series: [&[f64]; 3]) -> [Vec<f64>; 3] {
+    /// Three whole series, each with a filter of its own, in one pass; in single precision.
+    pub fn whiten_three(filters: &[Whitener; 3], series: [&[f64]; 3]) -> [Vec<f32>; 3] {
         let n = filters[0].rows.len();
         let rows = [&filters[0].rows[..n], &filters[1].rows[..n], &filters[2].rows[..n]];
         let series = series.map(|s| &s[..n]);
         let mut memory = [Memory::new(); 3];
-        let mut out: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(n));
+        let mut out: [Vec<f32>; 3] = std::array::from_fn(|_| Vec::with_capacity(n));
         for i in 0..n {
             for k in 0..3 {
-                out[k].extend(memory[k].whiten(&rows[k][i], [series[k][i]]));
+                let [w] = memory[k].whiten(&rows[k][i], [series[k][i]]);
+                out[k].push(w as f32);
             }
         }
         out
@@ -429,11 +432,11 @@ mod tests {
         let series = spans.map(|[first, last]| {
             (0..n).map(|i| if (first..last).contains(&i) { x[i] } else { 0.0 }).collect::<Vec<f64>>()
         });
-        let together = whitener.whiten_spans(series.each_ref().map(|s| &s[..]), spans);
+        let together = whitener.whiten_stretches(series.each_ref().map(|s| Stretch::of(s)));
         for ((series, [first, _]), whitened) in series.iter().zip(spans).zip(&together) {
-            let alone = whitener.whiten(series);
+            let alone: Vec<f32> = whitener.whiten(series).into_iter().map(|w| w as f32).collect();
             assert_eq!(whitened[..], alone[first..first + whitened.len()]);
-            let largest = alone.iter().fold(0.0_f64, |m, w| m.max(w.abs()));
+            let largest = alone.iter().fold(0.0_f32, |m, w| m.max(w.abs()));
             assert!(alone[first + whitened.len()..].iter().all(|w| w.abs() <= 2e-5 * largest));
         }
         assert!(together[1].len() < n - 300 && together[3].is_empty());

@@ -59,6 +59,29 @@ pub struct Schedule {
     pub shared_ng: [Vec<Vec<f64>>; 3],
 }
 
+/// A series at the windows from the first that is not zero to the last.
+#[derive(Debug, Clone, Copy)]
+pub struct Stretch<'a> {
+    /// Its first window.
+    pub first: usize,
+    /// Its values; outside them it is zero.
+    pub values: &'a [f64],
+}
+
+impl<'a> Stretch<'a> {
+    /// Of a whole series.
+    pub fn of(series: &'a [f64]) -> Self {
+        let first = series.iter().position(|x| *x != 0.0).unwrap_or(series.len());
+        let end = series.iter().rposition(|x| *x != 0.0).map_or(first, |i| i + 1);
+        Self { first, values: &series[first..end] }
+    }
+
+    /// One past its last window.
+    fn end(&self) -> usize {
+        self.first + self.values.len()
+    }
+}
+
 /// Window length, s: two windows closer than this share samples.
 const WINDOW_S: f64 = 50.0;
 
@@ -119,16 +142,19 @@ pub fn log_prior_but_slow(noise: &AxisNoise) -> f64 {
     lognormal(noise.short_ng / noise.white_ng, 0.2, 0.6) + lognormal(noise.short_tau_s, 100.0, 0.6)
 }
 
-/// Fit the noise of several axes side by side, each to its residual, in which a constant and `shared_ng` are nuisance; from `start`
+/// The axes in the lanes of a register: the first goes along twice, which is faster than a lane left empty.
+const LANES: [usize; 4] = [0, 1, 2, 0];
+
+/// Fit the noise of the axes side by side, each to its residual, in which a constant and `shared_ng` are nuisance; from `start`
 /// if there is one.
-pub fn fit<const L: usize>(
-    residual_ng: [&[f64]; L],
-    shared_ng: [&[Vec<f64>]; L],
+pub fn fit(
+    residual_ng: [&[f64]; 3],
+    shared_ng: [&[Vec<f64>]; 3],
     schedule: &Schedule,
-    loudness: [&Loudness; L],
-    start: Option<[&AxisNoise; L]>,
+    loudness: [&Loudness; 3],
+    start: Option<[&AxisNoise; 3]>,
     evaluations: usize,
-) -> [AxisNoise; L] {
+) -> [AxisNoise; 3] {
     let n = schedule.len() as f64;
     let rms_ng = residual_ng.map(|residual| {
         let mean = residual.iter().sum::<f64>() / n;
@@ -141,20 +167,21 @@ pub fn fit<const L: usize>(
         slow_ng: scale_ng * p[2].exp(),
         slow_tau_s: p[3].exp(),
     };
-    let series: [Series; L] = std::array::from_fn(|l| Series { data: residual_ng[l], shared: shared_ng[l] });
+    let series = LANES.map(|k| Series { data: residual_ng[k], shared: shared_ng[k] });
+    let loudness = LANES.map(|k| loudness[k]);
     // The overall scale is profiled: one rescaling step is exact up to the prior of the slow amplitude.
-    let evaluate = |points: [&[f64]; L]| {
-        let unit = std::array::from_fn(|l| noise_of(points[l], rms_ng[l]));
+    let evaluate = |points: [&[f64]; 3]| {
+        let unit = LANES.map(|k| noise_of(points[k], rms_ng[k]));
         let found = products(&unit, schedule, loudness, series);
-        std::array::from_fn::<(AxisNoise, f64), L, _>(|l| {
-            let scale2 = found[l].likeliest_scale2();
-            let noise = noise_of(points[l], rms_ng[l] * (0.5 * scale2.ln()).exp());
-            (noise, found[l].log_likelihood(scale2) + log_prior(&noise))
+        std::array::from_fn::<(AxisNoise, f64), 3, _>(|k| {
+            let scale2 = found[k].likeliest_scale2();
+            let noise = noise_of(points[k], rms_ng[k] * (0.5 * scale2.ln()).exp());
+            (noise, found[k].log_likelihood(scale2) + log_prior(&noise))
         })
     };
     let width = if start.is_some() { [0.25, 0.25, 0.4, 0.4] } else { [0.5, 0.5, 0.8, 0.8] };
-    let mut simplexes = std::array::from_fn::<Simplex, L, _>(|l| {
-        let begin = match start.map(|start| start[l]) {
+    let mut simplexes = std::array::from_fn::<Simplex, 3, _>(|k| {
+        let begin = match start.map(|start| start[k]) {
             Some(s) => {
                 [(s.short_ng / s.white_ng).ln(), s.short_tau_s.ln(), (s.slow_ng / s.white_ng).ln(), s.slow_tau_s.ln()]
             }
@@ -190,13 +217,13 @@ const MIDDLE: [f64; 4] = [-2.0, 4.5, -2.5, 7.5];
 
 /// Dot product.
 #[multiversion(targets("x86_64+avx+avx2"))]
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub fn dot<A: Copy + Into<f64>, B: Copy + Into<f64>>(a: &[A], b: &[B]) -> f64 {
     let mut lanes = [0.0; 8];
     let (ca, cb) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| x * y).sum();
+    let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| (*x).into() * (*y).into()).sum();
     for (x, y) in ca.zip(cb) {
         for j in 0..8 {
-            lanes[j] += x[j] * y[j];
+            lanes[j] += x[j].into() * y[j].into();
         }
     }
     lanes.iter().sum::<f64>() + tail
@@ -272,7 +299,7 @@ mod tests {
         let schedule = gappy();
         let loudness = Loudness::even(vec![1.0; schedule.len()]);
         let x = simulate(&noise, &schedule, &loudness, normals(11));
-        let [found] = fit([&x], [&[]], &schedule, [&loudness], None, 150);
+        let [found, ..] = fit([&x; 3], [&[]; 3], &schedule, [&loudness; 3], None, 150);
         assert!((found.white_ng / 100.0 - 1.0).abs() < 0.1, "{found:?}");
         assert!((found.slow_ng / 30.0).ln().abs() < 0.5, "{found:?}");
     }

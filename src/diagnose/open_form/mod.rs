@@ -76,7 +76,7 @@ impl Collector<'_> {
     ) {
         let (formulas, shapes): (Vec<String>, Vec<Shape>) = members
             .into_iter()
-            .filter_map(|(formula, series)| standard(&series).map(|series| (formula, Shape::Scalar(series))))
+            .filter_map(|(formula, series)| standard(&series).map(|series| (formula, Shape::scalar(&series))))
             .unzip();
         if !shapes.is_empty() {
             self.atoms.push(Atom { said: Said { covariate, location, formulas }, shapes });

@@ -64,10 +64,9 @@ pub struct Entry {
 impl Entry {
     /// A catalogue effect, `None` where the case does not allow it.
     pub fn listed(scene: &Scene, effect: &'static Effect) -> Option<Self> {
-        let points: Vec<(Theta, Shape)> = (effect.grid)(scene)
-            .into_iter()
-            .filter_map(|theta| (effect.signature)(scene, &theta).map(|s| (theta, s)))
-            .collect();
+        let grid = (effect.grid)(scene);
+        let at = |theta: &Theta| (effect.signature)(scene, theta).map(|shape| (*theta, shape));
+        let points: Vec<(Theta, Shape)> = shared_work::map(&grid, at).into_iter().flatten().collect();
         (!points.is_empty()).then(|| Self {
             family: Family::Listed(effect),
             log_prior: LOG_PRIOR,
@@ -154,7 +153,7 @@ fn whiten(frame: &Frame, theta: Theta, shape: &Shape, entry: &Entry, scale: f64)
         Shape::Columns(raws) => {
             raws.iter().zip(&entry.sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect()
         }
-        Shape::Scalar(_) | Shape::Fixed(_) => frame.columns(&shape.on_axes(&entry.sizes, scale)),
+        Shape::Scalar { .. } | Shape::Fixed(_) => frame.columns(&shape.on_axes(&entry.sizes, scale)),
     };
     Whitened::new(theta, shape, columns, entry, scale)
 }
@@ -346,7 +345,7 @@ pub fn best_of_entry(seen: &Seen, index: usize, chosen: &Chosen) -> (f64, Member
     let entry = &seen.bank.entries[index];
     let points = &seen.bank.points[index];
     // An open form of one series acts on all axes or on one of them: a quarter each.
-    let narrow = matches!((entry.family, &entry.points[0].1), (Family::Open(_), Shape::Scalar(_)));
+    let narrow = matches!((entry.family, &entry.points[0].1), (Family::Open(_), Shape::Scalar { .. }));
     let scales = entry.scales();
     let mut ways: Vec<(f64, usize, Option<usize>, f64)> = Vec::with_capacity(points.len() * 8);
     for (i, (p, alone)) in points.iter().zip(&seen.alone[index]).enumerate() {
