@@ -1,12 +1,12 @@
 """Peers of `oare challenge`: four usual methods on the same case directories, the same metrics printed.
 
-    python peers.py CASES_DIR [TRUTH_DIR] [--limit N]
+    python peers.py CASES_DIR [TRUTH_DIR] [--limit N] [--times]
 
 CASES_DIR holds case directories (as `oare challenge --out DIR` writes them, DIR/cases, their truths in DIR/truth; or the open
 cases, which carry their truth.json). All methods get regressors of the right form and the same autoregressive whitening
 (except the last two, which work on raw residuals as they are usually run). Losses are printed like wins.
 """
-import argparse, csv, json, sys, tomllib, warnings
+import argparse, csv, json, sys, time, tomllib, warnings
 from pathlib import Path
 
 import numpy as np
@@ -259,15 +259,25 @@ def main():
     a.add_argument("cases", type=Path)
     a.add_argument("truths", type=Path, nargs="?")
     a.add_argument("--limit", type=int, default=10**9)
+    a.add_argument("--times", action="store_true", help="how long each takes over a case, and nothing else")
     a = a.parse_args()
     done = {m: [] for m in METHODS}
+    took = {m: [] for m in METHODS}
     homes = [h for h in sorted(a.cases.iterdir()) if (h / "recording.csv").exists()][: a.limit]
     for k, home in enumerate(homes):
+        start = time.perf_counter()
         truth, case = truth_of(home, a.truths), Case(home)
+        reading = time.perf_counter() - start
         for m, f in METHODS.items():
+            start = time.perf_counter()
             done[m].append((truth, f(case)))
+            took[m].append(reading + time.perf_counter() - start)
         print(f"\r{k + 1}/{len(homes)}", end="", file=sys.stderr)
     print(file=sys.stderr)
+    if a.times:
+        for m, s in took.items():
+            print(f"{m}: {np.median(s):.2f} s, {max(s):.2f} s at most")
+        return
     snr = lambda t: min(t.get("snr", {"": 0}).values(), default=0)
     kind = lambda *ks: lambda t: t["kind"] in ks
     one = lambda lo, hi: lambda t: t["kind"] == "one" and lo <= snr(t) < hi

@@ -19,6 +19,9 @@ pub struct Args {
     /// First seed of every kind.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Length of the recordings, hours.
+    #[arg(long, default_value_t = Manner::default().hours, value_parser = clap::value_parser!(u32).range(12..=240))]
+    hours: u32,
     /// Only these kinds, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',')]
     kinds: Vec<Kind>,
@@ -97,7 +100,8 @@ fn concealed(args: &Args, engine: &Engine) -> anyhow::Result<Option<Vec<Outcome>
         (true, Some(id)) if effect::IDS.contains(&id) => vec![Kind::One],
         (true, Some(_)) => vec![Kind::Unknown],
     };
-    let manner = Manner { other_physics: args.other_physics, bursts: args.bursts, dump: args.dump };
+    let Args { hours, other_physics, bursts, dump, .. } = *args;
+    let manner = Manner { hours, other_physics, bursts, dump };
     let orders = run::plan(args.cases, args.seed, &kinds, manner, only);
     let progress = bar(orders.len(), "sealing");
     let seals = run::seal(&orders, &progress);

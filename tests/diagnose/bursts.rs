@@ -4,7 +4,7 @@ use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
 
-const BURSTS: Manner = Manner { other_physics: false, bursts: true, dump: false };
+const BURSTS: Manner = Manner { hours: 36, other_physics: false, bursts: true, dump: false };
 
 fn answer(kind: Kind, only: Option<&'static str>, manner: Manner) -> Diagnosis {
     let concealed = draw_order(&Order { kind, seed: 41, only, manner });

@@ -110,7 +110,7 @@ impl Drawn {
     pub fn draw(rng: &mut ChaCha12Rng, id: &'static str, flight: &Flight) -> Self {
         let mut p: Vec<(String, f64)> = Vec::new();
         let mut axis = None;
-        let span = |rng: &mut ChaCha12Rng| flight.start_s + between(rng, 0.1, 0.8) * super::flight::LENGTH_S;
+        let span = |rng: &mut ChaCha12Rng| flight.start_s + between(rng, 0.1, 0.8) * flight.length_s;
         match id {
             "gravity_gradient" | "rotation" | "atmosphere_corotation" => p.push(("fraction".into(), 1.0)),
             "aerodynamic_drag" => p.push(("fraction".into(), if rng.random_bool(0.5) { 0.2 } else { -0.2 })),

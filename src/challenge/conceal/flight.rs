@@ -8,14 +8,13 @@ use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 
 use super::draw::{between, log_between, pick};
+use super::{Kind, Manner};
 use crate::units::MissionTime;
 
 /// Step of the generator's own grid, s. The 20 s files take every fourth point of it.
 pub const STEP_S: f64 = 5.0;
 /// Points of the generator's grid in one step of the files.
 pub const FILE_STRIDE: usize = 4;
-/// Length of the recording, s.
-pub const LENGTH_S: f64 = 129_600.0;
 /// The files begin this long before the recording and end this long after it, s.
 pub const MARGIN_S: f64 = 600.0;
 /// Earth's gravitational parameter of the case format, m^3/s^2.
@@ -78,6 +77,8 @@ pub struct Vehicle {
 pub struct Flight {
     /// First instant of the recording, s.
     pub start_s: f64,
+    /// Its length, s.
+    pub length_s: f64,
     /// Times, s; they begin `MARGIN_S` before `start_s`.
     pub times_s: Vec<f64>,
     /// Inertial position, m.
@@ -107,12 +108,25 @@ pub struct Flight {
 }
 
 /// How free the drawing is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Freedom {
+    /// Length of the recording, s.
+    pub length_s: f64,
     /// One LVLH attitude with a tight deadband all the way.
     pub single_attitude: bool,
     /// Wind, density structure and panel areas that the analyser's own regressors do not have.
     pub other_physics: bool,
+}
+
+impl Freedom {
+    /// Of a kind of question, asked in a manner.
+    pub fn of(kind: Kind, manner: Manner) -> Self {
+        Self {
+            length_s: 3600.0 * f64::from(manner.hours),
+            single_attitude: kind == Kind::Single,
+            other_physics: manner.other_physics,
+        }
+    }
 }
 
 /// The attitudes seen on the open cases, and four more of the same kind.
@@ -132,11 +146,12 @@ const INERTIAL_DEG: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [30.0, 40.0, 0.0], [-60.0,
 impl Flight {
     /// Draws one.
     pub fn draw(rng: &mut ChaCha12Rng, freedom: Freedom) -> Self {
+        let length_s = freedom.length_s;
         let start_s = 13_800.0 + (between(rng, 48.0, 145.0) * 360.0).round() * 10.0;
-        let points = ((LENGTH_S + 2.0 * MARGIN_S) / STEP_S) as usize + 1;
+        let points = ((length_s + 2.0 * MARGIN_S) / STEP_S) as usize + 1;
         let times_s: Vec<f64> = (0..points).map(|k| start_s - MARGIN_S + STEP_S * k as f64).collect();
         let (position_m, velocity_m_s) = orbit(rng, points);
-        let events = log(rng, start_s);
+        let events = log(rng, start_s, length_s);
         let attitudes = plan(rng, start_s, freedom);
         let body = attitude(rng, &times_s, &position_m, &velocity_m_s, &attitudes, freedom);
         let rate_rad_s = rates(&body);
@@ -147,6 +162,7 @@ impl Flight {
         let vehicle = vehicle(rng, freedom);
         Self {
             start_s,
+            length_s,
             times_s,
             position_m,
             velocity_m_s,
@@ -165,7 +181,7 @@ impl Flight {
 
     /// Last instant of the recording, s.
     pub fn end_s(&self) -> f64 {
-        self.start_s + LENGTH_S
+        self.start_s + self.length_s
     }
 
     /// UTC at a clock of the flight.
@@ -244,7 +260,7 @@ fn plan(rng: &mut ChaCha12Rng, start_s: f64, freedom: Freedom) -> Vec<Attitude> 
     let mut from_s = vec![start_s - MARGIN_S];
     if !freedom.single_attitude {
         let more = *pick(rng, &[1, 1, 1, 2, 2, 3]);
-        let mut cuts: Vec<f64> = (0..more).map(|_| start_s + LENGTH_S * between(rng, 0.1, 0.9)).collect();
+        let mut cuts: Vec<f64> = (0..more).map(|_| start_s + freedom.length_s * between(rng, 0.1, 0.9)).collect();
         cuts.sort_by(f64::total_cmp);
         // A slew is over before the next begins.
         cuts.dedup_by(|next, before| *next - *before < APART_S);
@@ -409,11 +425,11 @@ fn wind(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>], freedom: Fre
         .collect()
 }
 
-/// The log as the open cases have it: two nights, some of jets, evaporator cycles, dumps and a change of mass.
-fn log(rng: &mut ChaCha12Rng, start_s: f64) -> Vec<Event> {
+/// The log as the open cases have it: a night a day, some of jets, evaporator cycles, dumps and a change of mass.
+fn log(rng: &mut ChaCha12Rng, start_s: f64, length_s: f64) -> Vec<Event> {
     let tenth = |t: f64| (t * 10.0).round() / 10.0;
     let mut events = Vec::new();
-    for day_s in [0.0, 86_400.0] {
+    for day_s in (0..).map(|day| 86_400.0 * f64::from(day)).take_while(|day_s| *day_s < length_s) {
         let clock_s = start_s + day_s + between(rng, 0.0, 3600.0);
         events.push(Event { clock_s, duration_s: 28_800.0, kind: "crew_sleep" });
     }
@@ -422,7 +438,7 @@ fn log(rng: &mut ChaCha12Rng, start_s: f64) -> Vec<Event> {
         let mut t = start_s;
         loop {
             t += -mean_s * (1.0 - rng.random::<f64>()).ln();
-            if t >= start_s + LENGTH_S {
+            if t >= start_s + length_s {
                 break;
             }
             events.push(Event { clock_s: t, duration_s: 80.0, kind: "thruster" });
@@ -430,7 +446,7 @@ fn log(rng: &mut ChaCha12Rng, start_s: f64) -> Vec<Event> {
     }
     if rng.random_bool(0.6) {
         for _ in 0..*pick(rng, &[2, 3, 4, 5]) {
-            let mut t = start_s + between(rng, 0.0, 0.9) * LENGTH_S;
+            let mut t = start_s + between(rng, 0.0, 0.9) * length_s;
             for _ in 0..*pick(rng, &[8, 12, 16, 24]) {
                 events.push(Event { clock_s: t, duration_s: between(rng, 240.0, 420.0), kind: "evaporator" });
                 t += between(rng, 550.0, 970.0);
@@ -439,19 +455,19 @@ fn log(rng: &mut ChaCha12Rng, start_s: f64) -> Vec<Event> {
     }
     if rng.random_bool(0.5) {
         for _ in 0..*pick(rng, &[1, 2, 2, 3]) {
-            let clock_s = start_s + between(rng, 0.05, 0.93) * LENGTH_S;
+            let clock_s = start_s + between(rng, 0.05, 0.93) * length_s;
             events.push(Event { clock_s, duration_s: between(rng, 1500.0, 3600.0), kind: "water_dump" });
         }
     }
     if rng.random_bool(0.5) {
-        let clock_s = start_s + between(rng, 0.25, 0.75) * LENGTH_S;
+        let clock_s = start_s + between(rng, 0.25, 0.75) * length_s;
         events.push(Event { clock_s, duration_s: 0.0, kind: "mass_change" });
     }
     for event in &mut events {
         event.clock_s = tenth(event.clock_s);
         event.duration_s = tenth(event.duration_s);
     }
-    events.retain(|event| event.clock_s < start_s + LENGTH_S);
+    events.retain(|event| event.clock_s < start_s + length_s);
     events.sort_by(|a, b| a.clock_s.total_cmp(&b.clock_s));
     events
 }
@@ -473,7 +489,7 @@ mod tests {
     #[test]
     fn no_slew_jumps() {
         for seed in 0..40 {
-            let flight = Flight::draw(&mut ChaCha12Rng::seed_from_u64(seed), Freedom::default());
+            let flight = Flight::draw(&mut ChaCha12Rng::seed_from_u64(seed), Freedom::of(Kind::One, Manner::default()));
             let fastest = flight.rate_rad_s.iter().map(|w| w.norm()).fold(0.0, f64::max).to_degrees();
             // 360 deg in 1000 s by the quintic is 0.68 deg/s, less the orbit's own 0.066.
             assert!(fastest < 0.8, "seed {seed}: {fastest} deg/s");
@@ -483,7 +499,7 @@ mod tests {
     #[test]
     fn a_held_lvlh_attitude_turns_once_an_orbit_backwards_about_the_cross_track_axis() {
         let mut rng = ChaCha12Rng::seed_from_u64(3);
-        let flight = Flight::draw(&mut rng, Freedom { single_attitude: true, other_physics: false });
+        let flight = Flight::draw(&mut rng, Freedom::of(Kind::Single, Manner::default()));
         let k = flight.times_s.len() / 2;
         let l = lvlh(&flight.position_m[k], &flight.velocity_m_s[k]);
         let in_lvlh = l * (flight.body[k].inverse() * flight.rate_rad_s[k]);

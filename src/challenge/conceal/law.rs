@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use rand_chacha::ChaCha12Rng;
 
 use super::draw::{between, direction, log_between, pick};
-use super::flight::{Flight, LENGTH_S, STEP_S};
+use super::flight::{Flight, STEP_S};
 use super::force::{self, Series};
 
 /// Name and plain statement of every law.
@@ -76,8 +76,8 @@ pub fn signature(rng: &mut ChaCha12Rng, name: &str, flight: &Flight, total: &[Ve
         "unknown_chirp" => {
             let (period, drift) = (log_between(rng, 500.0, 4000.0), between(rng, 0.3, 0.8));
             let shape = (0..n).map(|k| {
-                let x = k as f64 * STEP_S / LENGTH_S;
-                (std::f64::consts::TAU * LENGTH_S / period * (x + 0.5 * drift * x * x)).sin()
+                let x = k as f64 * STEP_S / flight.length_s;
+                (std::f64::consts::TAU * flight.length_s / period * (x + 0.5 * drift * x * x)).sin()
             });
             along(shape.collect(), fixed)
         }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::effect::{self, Drawn, Signal, apparent};
-use super::flight::{Flight, LENGTH_S, STEP_S};
+use super::flight::{Flight, STEP_S};
 use super::force::{self, Air, Series};
 use super::noise::{Noise, Whitening};
 use super::record::{awake, window_means};
@@ -103,7 +103,7 @@ impl<'a> Matched<'a> {
         let flight = self.flight;
         let offset = || (0..3).map(|i| apparent(flight, &Vector3::ith(i, 1.0))).collect::<Vec<_>>();
         let since = |onset: f64| flight.times_s.iter().map(move |t| t - onset);
-        let onsets = || (1..36).map(|j| flight.start_s + LENGTH_S * f64::from(j) / 36.0);
+        let onsets = || (1..36).map(|j| flight.start_s + flight.length_s * f64::from(j) / 36.0);
         let lags = [0.0, 600.0, 1200.0, 2400.0, 4800.0, 9600.0];
         match id {
             "cg_offset" => vec![Group::Columns(offset())],

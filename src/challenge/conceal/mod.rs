@@ -83,8 +83,10 @@ pub struct Order {
 }
 
 /// What a flight has that the analyser is not told of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Manner {
+    /// Length of the recording, hours.
+    pub hours: u32,
     /// Winds, density waves and panels of its own.
     pub other_physics: bool,
     /// Bursts in the noise, which the SNR does not know of.
@@ -92,6 +94,13 @@ pub struct Manner {
     /// The recording is a dump of the payload recorder: the simulator's instrument feels what the flight has, calibrates itself, and
     /// every calibration is to be worked out from what it sends.
     pub dump: bool,
+}
+
+impl Default for Manner {
+    /// As the open cases are.
+    fn default() -> Self {
+        Self { hours: 36, other_physics: false, bursts: false, dump: false }
+    }
 }
 
 /// A case and its truth.
@@ -153,9 +162,7 @@ struct Question {
 
 impl Question {
     fn draw(rng: &mut ChaCha12Rng, order: &Order, quieter: f64) -> Self {
-        let freedom =
-            Freedom { single_attitude: order.kind == Kind::Single, other_physics: order.manner.other_physics };
-        let mut flight = Flight::draw(rng, freedom);
+        let mut flight = Flight::draw(rng, Freedom::of(order.kind, order.manner));
         let ids = ids(rng, order);
         for id in &ids {
             require(rng, &mut flight, id);
@@ -321,7 +328,7 @@ fn require(rng: &mut ChaCha12Rng, flight: &mut Flight, id: &str) {
         _ => (180, 80.0),
     };
     for _ in 0..count {
-        let clock_s = flight.start_s + draw::between(rng, 0.2, 0.8) * flight::LENGTH_S;
+        let clock_s = flight.start_s + draw::between(rng, 0.2, 0.8) * flight.length_s;
         flight.events.push(Event { clock_s: (clock_s * 10.0).round() / 10.0, duration_s: length_s, kind });
     }
     flight.events.sort_by(|a, b| a.clock_s.total_cmp(&b.clock_s));

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use rand_chacha::ChaCha12Rng;
 
 use super::draw::{between, log_between, normal, pick};
-use super::flight::{FILE_STRIDE, Flight, LENGTH_S, MARGIN_S, STEP_S};
+use super::flight::{FILE_STRIDE, Flight, MARGIN_S, STEP_S};
 use super::noise::Noise;
 use super::{Question, force};
 use crate::diagnose::case::WINDOW_STRIDE_S;
@@ -17,7 +17,7 @@ const HALF_WINDOW: usize = 5;
 
 /// The grid of window centres, s: every 25 s, the first 25 s into the recording.
 pub fn centres_s(flight: &Flight) -> Vec<f64> {
-    let windows = (LENGTH_S / WINDOW_STRIDE_S) as usize - 1;
+    let windows = (flight.length_s / WINDOW_STRIDE_S) as usize - 1;
     (0..windows).map(|k| flight.start_s + WINDOW_STRIDE_S * (k + 1) as f64).collect()
 }
 
@@ -50,14 +50,15 @@ pub fn awake(flight: &Flight) -> Vec<f64> {
 /// Which windows arrive: calibrations every 4.18 h take 16 or 42 minutes, and a few stretches are lost.
 pub fn kept(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<bool> {
     let centres = centres_s(flight);
-    let mut lost: Vec<(f64, f64)> = (0..9)
+    let mut lost: Vec<(f64, f64)> = (0..)
         .map(|j| {
             let from = flight.start_s + 600.0 + 15_060.0 * f64::from(j);
             (from, from + if j % 3 == 0 { 2500.0 } else { 950.0 })
         })
+        .take_while(|(from, _)| *from < flight.end_s())
         .collect();
     for _ in 0..*pick(rng, &[0, 1, 1, 2, 3]) {
-        let from = flight.start_s + between(rng, 0.0, LENGTH_S);
+        let from = flight.start_s + between(rng, 0.0, flight.length_s);
         lost.push((from, from + log_between(rng, 600.0, 3200.0)));
     }
     centres.iter().map(|t| !lost.iter().any(|(from, to)| t > from && t < to)).collect()

@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 use rand_chacha::ChaCha12Rng;
 
-use super::flight::{Flight, LENGTH_S, STEP_S};
+use super::flight::{Flight, STEP_S};
 use super::noise::Noise;
 use super::record::{Recording, awake, centres_s, kept_of};
 use super::{Question, effect};
@@ -43,7 +43,7 @@ impl Tape {
     /// red goes: the instrument's filter has none.
     pub fn new(seed: u64, flight: &Flight, noise: &mut Noise) -> Self {
         noise.red_share = 0.0;
-        let mut config = MissionConfig::sts65(seed, LENGTH_S / 3600.0);
+        let mut config = MissionConfig::sts65(seed, flight.length_s / 3600.0);
         config.start_clock_s = flight.start_s as u32;
         config.time = Flight::mission();
         config.instrument = Instrument::sts65().varied(seed);
