@@ -157,7 +157,7 @@ pub struct Nonlinear {
 }
 
 impl Nonlinear {
-    /// What one is that has nothing of its own.
+    /// Neither refined nor jagged, without bounds and without a value of its own.
     const PLAIN: Self = Self {
         name: "",
         unit: "",
@@ -305,7 +305,12 @@ mod tests {
             assert!(!e.linear.is_empty() || !e.nonlinear.is_empty(), "{} has nothing to fit", e.id);
             assert!(e.linear.iter().all(|l| l.size > 0.0 && l.size_max > 2.0 * l.size), "{}: sizes", e.id);
             assert!(e.nonlinear.len() <= 2, "{}", e.id);
-            assert!(e.nonlinear.len() == 1 || e.nonlinear.iter().all(|p| p.atom.is_none()), "{}", e.id);
+            for p in e.nonlinear {
+                assert!(!p.name.is_empty(), "{}: a parameter without a name", e.id);
+                let fits =
+                    |atom: f64| e.nonlinear.len() == 1 && p.step > 0.0 && p.range[0] <= atom && atom <= p.range[1];
+                assert!(p.atom.is_none_or(fits), "{}: {}", e.id, p.name);
+            }
             assert_eq!(by_id(e.id).map(|x| x.name), Some(e.name));
         }
     }

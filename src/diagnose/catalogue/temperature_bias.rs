@@ -20,6 +20,7 @@ pub const EFFECT: Effect = Effect {
         name: "lag_s",
         unit: "s",
         step: 200.0,
+        // A sensor in the open follows at once, one behind insulation late: either as likely.
         atom: Some(0.0),
         range: [0.0, 28_800.0],
         ..Nonlinear::PLAIN

@@ -27,7 +27,8 @@ pub type Raw = [Option<Vec<f64>>; 3];
 #[derive(Debug, Clone)]
 struct Part {
     first: usize,
-    /// In single precision: a bank of them is read many times over, and what rounding takes is 1e-7 of the noise.
+    /// In single precision, since a bank of them is read many times over: rounding takes 6e-8 of each value, the same in every
+    /// product of the column.
     whitened: Arc<Vec<f32>>,
     /// Its products with what is nuisance on this axis.
     nuisance: Vec<f64>,
@@ -197,7 +198,12 @@ impl Frame {
 
     /// The same filters, another residual.
     pub fn with_data(&self, residual_ng: &Axes) -> Self {
-        let data = self.column(&std::array::from_fn(|k| Some(residual_ng[k].clone())), 1.0);
+        // The constant is nuisance, however large: it goes before rounding can make anything of it.
+        let centred = residual_ng.each_ref().map(|series| {
+            let mean = series.iter().sum::<f64>() / series.len() as f64;
+            Some(series.iter().map(|x| x - mean).collect())
+        });
+        let data = self.column(&centred, 1.0);
         let log_null = self.log_det - 0.5 * data.dot(&data);
         Self { data, log_null, ..self.clone() }
     }

@@ -47,6 +47,19 @@ fn a_prior_about_a_mean_is_one_about_nothing_of_what_the_mean_leaves() {
     assert!(0.85 < size && size < 1.0, "between what the data say and what the prior does: {size}");
 }
 
+/// A constant is nuisance however large it is: also to what subtracts whole series, as a clock offset does.
+#[test]
+fn a_constant_a_thousand_times_the_noise_changes_no_evidence() {
+    let wave: Vec<f64> = (0..WINDOWS).map(|i| 60.0 * (0.05 * f64::from(i)).sin()).collect();
+    let evidence = |constant: f64| {
+        let residual: Axes = std::array::from_fn(|_| wave.iter().map(|x| constant + 0.9 * x).collect());
+        let frame = framed(8.0, schedule(), &residual);
+        Chosen::new(&frame, Vec::new(), &[&full_column(&frame, &wave, 1.0)]).log_evidence
+    };
+    let (none, large) = (evidence(0.0), evidence(1e6));
+    assert!(none > 10.0 && (none - large).abs() < 1e-4 * none, "{none} {large}");
+}
+
 /// Of an error that all windows share the data decide the share that their energy has beside its prior, and no column along it
 /// explains more than what is left.
 #[test]

@@ -233,6 +233,7 @@ impl Whitener {
     /// Side by side, because one after the other waits for itself: every step of a filter needs the one before.
     pub fn whiten_stretches<const L: usize>(&self, series: [Stretch; L]) -> [Vec<f32>; L] {
         let n = self.rows.len();
+        debug_assert!(series.iter().all(|s| s.end() <= n), "a value for no more than every window");
         let begin = series.iter().map(|s| s.first).min().unwrap_or(0).min(n);
         let rest = series.iter().map(Stretch::end).max().unwrap_or(n);
         let mut memory = Memory::new();
@@ -428,12 +429,12 @@ mod tests {
         let whitener = Whitener::new(&NOISE, &schedule, &loudness);
         let n = schedule.len();
         // The whole record, a stretch of it, its end, and nothing at all.
-        let spans = [[0, n], [300, 420], [n - 30, n], [n, n]];
-        let series = spans.map(|[first, last]| {
+        let stretches = [[0, n], [300, 420], [n - 30, n], [n, n]];
+        let series = stretches.map(|[first, last]| {
             (0..n).map(|i| if (first..last).contains(&i) { x[i] } else { 0.0 }).collect::<Vec<f64>>()
         });
         let together = whitener.whiten_stretches(series.each_ref().map(|s| Stretch::of(s)));
-        for ((series, [first, _]), whitened) in series.iter().zip(spans).zip(&together) {
+        for ((series, [first, _]), whitened) in series.iter().zip(stretches).zip(&together) {
             let alone: Vec<f32> = whitener.whiten(series).into_iter().map(|w| w as f32).collect();
             assert_eq!(whitened[..], alone[first..first + whitened.len()]);
             let largest = alone.iter().fold(0.0_f32, |m, w| m.max(w.abs()));

@@ -143,7 +143,7 @@ pub fn log_prior_but_slow(noise: &AxisNoise) -> f64 {
 }
 
 /// The axes in the lanes of a register: the first goes along twice, which is faster than a lane left empty.
-const LANES: [usize; 4] = [0, 1, 2, 0];
+const AXIS_OF_LANE: [usize; 4] = [0, 1, 2, 0];
 
 /// Fit the noise of the axes side by side, each to its residual, in which a constant and `shared_ng` are nuisance; from `start`
 /// if there is one.
@@ -167,11 +167,11 @@ pub fn fit(
         slow_ng: scale_ng * p[2].exp(),
         slow_tau_s: p[3].exp(),
     };
-    let series = LANES.map(|k| Series { data: residual_ng[k], shared: shared_ng[k] });
-    let loudness = LANES.map(|k| loudness[k]);
+    let series = AXIS_OF_LANE.map(|k| Series { data: residual_ng[k], shared: shared_ng[k] });
+    let loudness = AXIS_OF_LANE.map(|k| loudness[k]);
     // The overall scale is profiled: one rescaling step is exact up to the prior of the slow amplitude.
     let evaluate = |points: [&[f64]; 3]| {
-        let unit = LANES.map(|k| noise_of(points[k], rms_ng[k]));
+        let unit = AXIS_OF_LANE.map(|k| noise_of(points[k], rms_ng[k]));
         let found = products(&unit, schedule, loudness, series);
         std::array::from_fn::<(AxisNoise, f64), 3, _>(|k| {
             let scale2 = found[k].likeliest_scale2();
@@ -299,7 +299,10 @@ mod tests {
         let schedule = gappy();
         let loudness = Loudness::even(vec![1.0; schedule.len()]);
         let x = simulate(&noise, &schedule, &loudness, normals(11));
-        let [found, ..] = fit([&x; 3], [&[]; 3], &schedule, [&loudness; 3], None, 150);
+        let twice: Vec<f64> = x.iter().map(|x| 2.0 * x).collect();
+        let [found, again, other] = fit([&x, &x, &twice], [&[]; 3], &schedule, [&loudness; 3], None, 150);
+        assert_eq!(found, again);
+        assert!((other.white_ng / found.white_ng - 2.0).abs() < 0.05, "{found:?} {other:?}");
         assert!((found.white_ng / 100.0 - 1.0).abs() < 0.1, "{found:?}");
         assert!((found.slow_ng / 30.0).ln().abs() < 0.5, "{found:?}");
     }

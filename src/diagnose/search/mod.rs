@@ -55,6 +55,8 @@ pub struct Entry {
     pub log_prior: f64,
     /// Starting points.
     pub points: Vec<(Theta, Shape)>,
+    /// Log share of the prior that each of them stands for.
+    pub log_shares: Vec<f64>,
     /// Prior sizes of the coefficients.
     pub sizes: Vec<f64>,
     /// Prior means of the coefficients, in their own units.
@@ -70,6 +72,7 @@ impl Entry {
         (!points.is_empty()).then(|| Self {
             family: Family::Listed(effect),
             log_prior: LOG_PRIOR,
+            log_shares: log_shares(scene, effect, &points.iter().map(|(theta, _)| theta[0]).collect::<Vec<f64>>()),
             points,
             sizes: effect.linear.iter().map(|l| l.prior().size).collect(),
             means: effect.linear.iter().map(|l| l.prior().mean).collect(),
@@ -86,6 +89,7 @@ impl Entry {
         Self {
             family: Family::Open(index),
             log_prior,
+            log_shares: equal(shapes.len()),
             points: shapes.into_iter().enumerate().map(|(i, shape)| ([i as f64, 0.0], shape)).collect(),
             sizes,
             means: vec![0.0; count],
@@ -111,6 +115,32 @@ impl Entry {
             Family::Open(_) => None,
         }
     }
+}
+
+fn equal(points: usize) -> Vec<f64> {
+    vec![-(points as f64).ln(); points]
+}
+
+/// Log shares of the prior that starting points stand for, each with the stretch of its parameter half way to those beside it; a point
+/// that has half of the prior to itself has that. Equal where there is more than one parameter, or points in place of a continuum.
+fn log_shares(scene: &Scene, effect: &Effect, points: &[f64]) -> Vec<f64> {
+    let [parameter] = effect.nonlinear else { return equal(points.len()) };
+    if parameter.step == 0.0 || points.len() < 2 {
+        return equal(points.len());
+    }
+    let mut sorted = points.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let is_atom = |x: f64| parameter.atom == Some(x);
+    let mass = |x: &f64| {
+        let i = sorted.partition_point(|y| y < x);
+        let [before, after] = [i.saturating_sub(1), (i + 1).min(sorted.len() - 1)];
+        let stretch = (sorted[after] - sorted[before]) / (after - before) as f64;
+        if is_atom(*x) { 0.0 } else { (effect.log_density)(scene, &[*x, 0.0]).exp() * stretch }
+    };
+    let masses: Vec<f64> = points.iter().map(mass).collect();
+    let has_atom = points.iter().any(|x| is_atom(*x));
+    let whole = masses.iter().sum::<f64>() * if has_atom { 2.0 } else { 1.0 };
+    points.iter().zip(masses).map(|(x, mass)| if is_atom(*x) { 0.5_f64 } else { mass / whole }.ln()).collect()
 }
 
 /// A family at one point, whitened.
@@ -202,7 +232,7 @@ pub struct Member {
     pub scale: f64,
     /// Nonlinear parameters.
     pub theta: Theta,
-    /// Their log prior density times the volume of their posterior.
+    /// Log share of their prior that their posterior fills.
     pub log_occam: f64,
     /// Standard errors of the nonlinear parameters.
     pub theta_sigma: Theta,
@@ -340,6 +370,20 @@ fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, m: &Member, theta: &The
     Some(point)
 }
 
+/// One way to add an entry to a set.
+#[derive(Clone, Copy)]
+struct Way {
+    /// Log evidence gained.
+    gain: f64,
+    /// Log share of the prior.
+    log_share: f64,
+    point: usize,
+    axis: Option<usize>,
+    scale: f64,
+}
+
+const NO_WAY: Way = Way { gain: f64::MIN, log_share: 0.0, point: 0, axis: None, scale: 1.0 };
+
 /// The best way to add one entry to a chosen set: the score gained with priors, and the member.
 pub fn best_of_entry(seen: &Seen, index: usize, chosen: &Chosen) -> (f64, Member) {
     let entry = &seen.bank.entries[index];
@@ -347,23 +391,32 @@ pub fn best_of_entry(seen: &Seen, index: usize, chosen: &Chosen) -> (f64, Member
     // An open form of one series acts on all axes or on one of them: a quarter each.
     let narrow = matches!((entry.family, &entry.points[0].1), (Family::Open(_), Shape::Scalar { .. }));
     let scales = entry.scales();
-    let mut ways: Vec<(f64, usize, Option<usize>, f64)> = Vec::with_capacity(points.len() * 8);
+    let mut ways: Vec<Way> = Vec::with_capacity(points.len() * 8);
     for (i, (p, alone)) in points.iter().zip(&seen.alone[index]).enumerate() {
         let normal = chosen.beside(&p.columns, alone);
         if p.fixed {
-            ways.push((normal.gain_at_one(), i, None, 1.0));
+            ways.push(Way {
+                gain: normal.gain_at_one(),
+                log_share: entry.log_shares[i],
+                point: i,
+                axis: None,
+                scale: 1.0,
+            });
             continue;
         }
+        let each = scales.len() * if narrow { 4 } else { 1 };
+        let log_share = entry.log_shares[i] - (each as f64).ln();
         for &scale in scales {
-            ways.push((normal.gain(scale), i, None, scale));
+            ways.push(Way { gain: normal.gain(scale), log_share, point: i, axis: None, scale });
             if narrow {
-                ways.extend((0..3).map(|axis| (normal.gain_of(axis, scale), i, Some(axis), scale)));
+                let on = |axis| Way { gain: normal.gain_of(axis, scale), log_share, point: i, axis: Some(axis), scale };
+                ways.extend((0..3).map(on));
             }
         }
     }
-    let best = ways.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
-    let (top, best, axis, scale) = best.unwrap_or((f64::MIN, 0, None, 1.0));
-    let marginal = top + (ways.iter().map(|w| (w.0 - top).exp()).sum::<f64>() / ways.len() as f64).ln();
+    let best = ways.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
+    let &Way { gain: top, point: best, axis, scale, .. } = best.unwrap_or(&NO_WAY);
+    let marginal = top + ways.iter().map(|w| (w.gain + w.log_share - top).exp()).sum::<f64>().ln();
     let mut point = points[best].clone();
     if let Some(axis) = axis {
         point.columns = vec![point.columns.swap_remove(axis)];

@@ -1,6 +1,6 @@
 //! The nonlinear parameters of a set: their best values; and where columns that are only nearly linear are taken.
 
-use super::volume::volume;
+use super::volume::{volume, with};
 use super::{Entry, Member, Set, point_at, whiten};
 use crate::diagnose::catalogue::Theta;
 use crate::diagnose::design::Frame;
@@ -22,7 +22,7 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         }
         let others = set.without(i);
         let chosen = others.chosen(frame);
-        let mut theta = set.members[i].theta;
+        let theta = set.members[i].theta;
         let scale = set.members[i].scale;
         let gain = |theta: &Theta| -> f64 {
             let Some(shape) = (effect.signature)(scene, theta) else { return f64::NEG_INFINITY };
@@ -37,17 +37,11 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
             free.iter().zip(p).for_each(|(j, x)| t[*j] = *x);
             t
         };
-        let before = gain(&theta);
-        let best = nelder_mead(&start, &steps, 60, |p| -gain(&place(p)));
-        let refined = place(&best);
-        let peak = gain(&refined);
-        if peak >= before {
-            theta = refined;
-        }
-        let peak = peak.max(before);
-        if !peak.is_finite() {
-            continue;
-        }
+        let refined = place(&nelder_mead(&start, &steps, 60, |p| -gain(&place(p))));
+        let atom = free.iter().find_map(|j| Some(with(&theta, *j, effect.nonlinear[*j].atom?)));
+        let places = [Some(theta), Some(refined), atom].into_iter().flatten().map(|theta| (gain(&theta), theta));
+        let best = places.filter(|(gain, _)| gain.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((peak, theta)) = best else { continue };
         let (log_occam, sigma) = volume(&gain, &theta, &free, effect, (effect.log_density)(scene, &theta), peak);
         if let Some(point) = point_at(scene, frame, entry, &set.members[i], &theta) {
             let m = &mut set.members[i];

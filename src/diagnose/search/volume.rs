@@ -8,8 +8,8 @@ use nalgebra::DMatrix;
 
 use crate::diagnose::catalogue::{Effect, Theta};
 
-/// Log of the share of the prior's mass, whose log density at the peak is `log_density`, and standard errors, of the parameters `free` of an
-/// effect whose log evidence is `gain` and has its `peak` at `theta`.
+/// Log of the share of the prior that the posterior fills, never more than all of it, and standard errors, of the parameters `free` of
+/// an effect: its log evidence is `gain`, highest (`peak`) at `theta`, where the log density of the prior is `log_density`.
 pub fn volume(
     gain: &impl Fn(&Theta) -> f64,
     theta: &Theta,
@@ -58,11 +58,12 @@ pub fn volume(
         log_volume += (area(gain, theta, *j, h[a], peak) / parabola).ln();
     }
     let log_share = (log_volume + log_density).min(0.0);
-    let atom = free.iter().find_map(|j| effect.nonlinear[*j].atom.map(|atom| gain(&with(theta, *j, atom)) - peak));
+    let atom = free.iter().find_map(|j| Some(gain(&with(theta, *j, effect.nonlinear[*j].atom?)) - peak));
     (atom.map_or(log_share, |atom| (0.5 * (atom.exp() + log_share.exp())).ln()), sigma)
 }
 
-fn with(theta: &Theta, j: usize, value: f64) -> Theta {
+/// The parameters with another value of one.
+pub(super) fn with(theta: &Theta, j: usize, value: f64) -> Theta {
     let mut theta = *theta;
     theta[j] = value;
     theta
@@ -134,7 +135,9 @@ mod tests {
     fn a_value_with_half_of_the_prior_counts_as_far_as_the_evidence_stands_there() {
         let effect = &crate::diagnose::catalogue::temperature_bias::EFFECT;
         let at = |lag: f64| {
-            let gain = |t: &Theta| 9.0 - 0.5 * ((t[0] - lag) / 50.0).powi(2);
+            let gain = |t: &Theta| {
+                if t[0] < 0.0 { f64::NEG_INFINITY } else { 9.0 - 0.5 * ((t[0] - lag) / 50.0).powi(2) }
+            };
             volume(&gain, &[lag, 0.0], &[0], effect, -28_800.0_f64.ln(), 9.0).0
         };
         let elsewhere = 0.5 * (std::f64::consts::TAU.sqrt() * 50.0 / 28_800.0);
