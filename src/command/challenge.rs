@@ -1,5 +1,6 @@
 //! `oare challenge`: conceal cases, commit to their truth, analyse them blind, reveal, score.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -9,6 +10,9 @@ use oare_ground::challenge::conceal::{Kind, Manner, effect, law};
 use oare_ground::challenge::engine::Engine;
 use oare_ground::challenge::score::{Outcome, score};
 use oare_ground::challenge::{run, seal};
+
+/// Half a day has a night and a day of the crew; beyond ten the recording would outlast the mission.
+const HOURS: RangeInclusive<i64> = 12..=240;
 
 /// Conceal cases, commit to their truth, analyse them blind, reveal, score.
 #[derive(clap::Args)]
@@ -20,7 +24,7 @@ pub struct Args {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Length of the recordings, hours.
-    #[arg(long, default_value_t = Manner::default().hours, value_parser = clap::value_parser!(u32).range(12..=240))]
+    #[arg(long, default_value_t = Manner::default().hours, value_parser = clap::value_parser!(u32).range(HOURS))]
     hours: u32,
     /// Only these kinds, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',')]

@@ -12,6 +12,7 @@ use super::report::{CovariatePlate, Plates};
 use super::scene::{Axes, Scene};
 use super::solve::{Library, Solution, null_noise};
 use super::verdict::{self, Proof};
+use crate::math::rms::about_mean;
 use crate::math::shared_work;
 
 /// How to analyse.
@@ -109,10 +110,6 @@ impl<'a> Prepared<'a> {
 }
 
 fn plates(scene: &Scene, model_ng: Axes, ladder: Vec<(String, f64)>) -> Plates {
-    let centred = |series: &[f64]| {
-        let mean = series.iter().sum::<f64>() / series.len() as f64;
-        series.iter().map(|x| x - mean).collect::<Vec<f64>>()
-    };
     let plate =
         |name: &str, unit: &str, values: Vec<f64>| CovariatePlate { name: name.into(), unit: unit.into(), values };
     let degrees = |x: f64| x.to_degrees();
@@ -136,8 +133,8 @@ fn plates(scene: &Scene, model_ng: Axes, ladder: Vec<(String, f64)>) -> Plates {
     Plates {
         clock_s: scene.clock_s().to_vec(),
         liftoff_clock_s: scene.case.header.liftoff_clock_s,
-        before_ng: std::array::from_fn(|k| centred(&scene.residual_ng[k])),
-        model_ng: std::array::from_fn(|k| centred(&model_ng[k])),
+        before_ng: std::array::from_fn(|k| about_mean(&scene.residual_ng[k])),
+        model_ng: std::array::from_fn(|k| about_mean(&model_ng[k])),
         sunlit: at_windows(scene, |g| scene.sunlit[g]),
         events: scene.case.events.iter().map(|e| (e.clock_s, e.clock_s + e.duration_s, e.kind.clone())).collect(),
         covariates,

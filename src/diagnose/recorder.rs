@@ -11,6 +11,7 @@ use super::case::{Case, Fault, Header, Recording, Texts};
 use super::error::CaseError;
 use super::noise::dot;
 use crate::ingest::wire::{PlaybackPart, PlaybackReader};
+use crate::math::rms::about_mean;
 use crate::pipeline::calibration::{Anomaly, Bias, Calibration, bias_law::PARAMETERS};
 use crate::pipeline::station::{Station, replay};
 use crate::pipeline::window::Window;
@@ -93,11 +94,6 @@ fn principal(errors: &[Vec<f64>]) -> Vec<Vec<f64>> {
         sum
     })
     .collect()
-}
-
-fn about_mean(series: &[f64]) -> Vec<f64> {
-    let mean = series.iter().sum::<f64>() / series.len() as f64;
-    series.iter().map(|x| x - mean).collect()
 }
 
 /// A bias error that varies less is left out, ng rms: over a day of the quietest windows known, 25 ng of noise, it has an SNR of

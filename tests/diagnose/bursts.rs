@@ -4,8 +4,6 @@ use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
 
-const BURSTS: Manner = Manner { hours: 36, other_physics: false, bursts: true, dump: false };
-
 fn answer(kind: Kind, only: Option<&'static str>, manner: Manner) -> Diagnosis {
     let concealed = draw_order(&Order { kind, seed: 41, only, manner });
     diagnose(&super::case(&concealed.files), &Settings::default()).unwrap()
@@ -19,10 +17,11 @@ fn weigh_less(answer: &Diagnosis) -> bool {
 /// they are out by, which would be 1.4 times.
 #[test]
 fn bursts_are_no_finding_and_hide_none() {
-    let nothing = answer(Kind::Clean, None, BURSTS);
+    let bursts = Manner { bursts: true, ..Manner::default() };
+    let nothing = answer(Kind::Clean, None, bursts);
     assert_eq!(nothing.verdict, Verdict::Consistent, "{nothing:?}");
     assert!(weigh_less(&nothing), "{:?}", nothing.notes);
-    let [even, loud] = [Manner::default(), BURSTS].map(|manner| answer(Kind::One, Some("cg_offset"), manner));
+    let [even, loud] = [Manner::default(), bursts].map(|manner| answer(Kind::One, Some("cg_offset"), manner));
     assert!(!weigh_less(&even) && weigh_less(&loud));
     for found in [&even, &loud] {
         assert_eq!((found.verdict, found.effects[0].id.as_str()), (Verdict::Explained, "cg_offset"), "{found:?}");

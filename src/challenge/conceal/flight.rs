@@ -107,28 +107,6 @@ pub struct Flight {
     pub vehicle: Vehicle,
 }
 
-/// How free the drawing is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Freedom {
-    /// Length of the recording, s.
-    pub length_s: f64,
-    /// One LVLH attitude with a tight deadband all the way.
-    pub single_attitude: bool,
-    /// Wind, density structure and panel areas that the analyser's own regressors do not have.
-    pub other_physics: bool,
-}
-
-impl Freedom {
-    /// Of a kind of question, asked in a manner.
-    pub fn of(kind: Kind, manner: Manner) -> Self {
-        Self {
-            length_s: 3600.0 * f64::from(manner.hours),
-            single_attitude: kind == Kind::Single,
-            other_physics: manner.other_physics,
-        }
-    }
-}
-
 /// The attitudes seen on the open cases, and four more of the same kind.
 const LVLH_DEG: [[f64; 3]; 9] = [
     [0.0, 0.0, 0.0],
@@ -144,22 +122,23 @@ const LVLH_DEG: [[f64; 3]; 9] = [
 const INERTIAL_DEG: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [30.0, 40.0, 0.0], [-60.0, 10.0, 75.0], [90.0, -35.0, 20.0]];
 
 impl Flight {
-    /// Draws one.
-    pub fn draw(rng: &mut ChaCha12Rng, freedom: Freedom) -> Self {
-        let length_s = freedom.length_s;
+    /// Draws one for a kind of question, asked in a manner.
+    pub fn draw(rng: &mut ChaCha12Rng, kind: Kind, manner: Manner) -> Self {
+        let length_s = 3600.0 * f64::from(manner.hours);
+        let (is_single, other_physics) = (kind == Kind::Single, manner.other_physics);
         let start_s = 13_800.0 + (between(rng, 48.0, 145.0) * 360.0).round() * 10.0;
         let points = ((length_s + 2.0 * MARGIN_S) / STEP_S) as usize + 1;
         let times_s: Vec<f64> = (0..points).map(|k| start_s - MARGIN_S + STEP_S * k as f64).collect();
         let (position_m, velocity_m_s) = orbit(rng, points);
         let events = log(rng, start_s, length_s);
-        let attitudes = plan(rng, start_s, freedom);
-        let body = attitude(rng, &times_s, &position_m, &velocity_m_s, &attitudes, freedom);
+        let attitudes = plan(rng, start_s, length_s, is_single);
+        let body = attitude(rng, &times_s, &position_m, &velocity_m_s, &attitudes, is_single);
         let rate_rad_s = rates(&body);
         let rate_change_rad_s2 = derivative(&rate_rad_s);
-        let (density_flat_kg_m3, bulge) = density(rng, &times_s, &position_m, freedom);
+        let (density_flat_kg_m3, bulge) = density(rng, &times_s, &position_m, other_physics);
         let temperature_c = temperature(rng, &times_s, &position_m);
-        let wind_m_s = wind(rng, &times_s, &position_m, freedom);
-        let vehicle = vehicle(rng, freedom);
+        let wind_m_s = wind(rng, &times_s, &position_m, other_physics);
+        let vehicle = vehicle(rng, other_physics);
         Self {
             start_s,
             length_s,
@@ -190,8 +169,8 @@ impl Flight {
     }
 }
 
-fn vehicle(rng: &mut ChaCha12Rng, freedom: Freedom) -> Vehicle {
-    let mut face = || Vector3::from_fn(|_, _| if freedom.other_physics { between(rng, 0.94, 1.06) } else { 1.0 });
+fn vehicle(rng: &mut ChaCha12Rng, other_physics: bool) -> Vehicle {
+    let mut face = || Vector3::from_fn(|_, _| if other_physics { between(rng, 0.94, 1.06) } else { 1.0 });
     let face_scale = [face(), face()];
     let sensor_offset_m = Vector3::new(
         -1.5 + 0.1 * super::draw::normal(rng),
@@ -256,11 +235,11 @@ fn euler(angles_deg: [f64; 3]) -> Rotation3<f64> {
     axis(Vector3::x(), roll) * axis(Vector3::y(), pitch) * axis(Vector3::z(), yaw)
 }
 
-fn plan(rng: &mut ChaCha12Rng, start_s: f64, freedom: Freedom) -> Vec<Attitude> {
+fn plan(rng: &mut ChaCha12Rng, start_s: f64, length_s: f64, is_single: bool) -> Vec<Attitude> {
     let mut from_s = vec![start_s - MARGIN_S];
-    if !freedom.single_attitude {
+    if !is_single {
         let more = *pick(rng, &[1, 1, 1, 2, 2, 3]);
-        let mut cuts: Vec<f64> = (0..more).map(|_| start_s + freedom.length_s * between(rng, 0.1, 0.9)).collect();
+        let mut cuts: Vec<f64> = (0..more).map(|_| start_s + length_s * between(rng, 0.1, 0.9)).collect();
         cuts.sort_by(f64::total_cmp);
         // A slew is over before the next begins.
         cuts.dedup_by(|next, before| *next - *before < APART_S);
@@ -269,7 +248,7 @@ fn plan(rng: &mut ChaCha12Rng, start_s: f64, freedom: Freedom) -> Vec<Attitude> 
     let mut plan: Vec<Attitude> = Vec::new();
     for from_s in from_s {
         loop {
-            let inertial = !freedom.single_attitude && rng.random_bool(0.3);
+            let inertial = !is_single && rng.random_bool(0.3);
             let (hold, list) = if inertial { (Hold::Inertial, &INERTIAL_DEG[..]) } else { (Hold::Lvlh, &LVLH_DEG[..]) };
             let next = Attitude { from_s, hold, euler_deg: *pick(rng, list) };
             if plan.last().is_none_or(|last| last.hold != next.hold || last.euler_deg != next.euler_deg) {
@@ -287,10 +266,10 @@ fn attitude(
     r: &[Vector3<f64>],
     v: &[Vector3<f64>],
     plan: &[Attitude],
-    freedom: Freedom,
+    is_single: bool,
 ) -> Vec<Rotation3<f64>> {
     let half_width: f64 =
-        if freedom.single_attitude { log_between(rng, 0.02, 0.1) } else { log_between(rng, 0.12, 0.8) }.to_radians();
+        if is_single { log_between(rng, 0.02, 0.1) } else { log_between(rng, 0.12, 0.8) }.to_radians();
     let wave: Vec<(f64, f64, f64)> = (0..3)
         .map(|_| {
             (half_width * between(rng, 0.5, 1.0), between(rng, 700.0, 1700.0), between(rng, 0.0, std::f64::consts::TAU))
@@ -370,11 +349,11 @@ fn derivative(series: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
 }
 
 /// Exponential in height above the equatorial radius; with other physics, waves and a latitude term beside it.
-fn density(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>], freedom: Freedom) -> (Vec<f64>, f64) {
+fn density(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>], other_physics: bool) -> (Vec<f64>, f64) {
     let at_300_km = log_between(rng, 6e-12, 1.5e-11);
     let (scale_m, structure) =
-        if freedom.other_physics { (between(rng, 40e3, 55e3), between(rng, 0.02, 0.08)) } else { (45e3, 0.0) };
-    let lat = between(rng, -0.1, 0.1) * if freedom.other_physics { 1.0 } else { 0.0 };
+        if other_physics { (between(rng, 40e3, 55e3), between(rng, 0.02, 0.08)) } else { (45e3, 0.0) };
+    let lat = between(rng, -0.1, 0.1) * if other_physics { 1.0 } else { 0.0 };
     let waves: Vec<(f64, f64)> =
         (0..4).map(|_| (log_between(rng, 900.0, 40e3), between(rng, 0.0, std::f64::consts::TAU))).collect();
     let density = r
@@ -411,8 +390,8 @@ fn temperature(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>]) -> Ve
 }
 
 /// A wind over local time and latitude that the simulation knows too (inertial axes), zero unless the physics is its own.
-fn wind(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>], freedom: Freedom) -> Vec<Vector3<f64>> {
-    let size_m_s = if freedom.other_physics { between(rng, 50.0, 180.0) } else { 0.0 };
+fn wind(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>], other_physics: bool) -> Vec<Vector3<f64>> {
+    let size_m_s = if other_physics { between(rng, 50.0, 180.0) } else { 0.0 };
     let phase = between(rng, 0.0, std::f64::consts::TAU);
     r.iter()
         .zip(times_s)
@@ -489,7 +468,7 @@ mod tests {
     #[test]
     fn no_slew_jumps() {
         for seed in 0..40 {
-            let flight = Flight::draw(&mut ChaCha12Rng::seed_from_u64(seed), Freedom::of(Kind::One, Manner::default()));
+            let flight = Flight::draw(&mut ChaCha12Rng::seed_from_u64(seed), Kind::One, Manner::default());
             let fastest = flight.rate_rad_s.iter().map(|w| w.norm()).fold(0.0, f64::max).to_degrees();
             // 360 deg in 1000 s by the quintic is 0.68 deg/s, less the orbit's own 0.066.
             assert!(fastest < 0.8, "seed {seed}: {fastest} deg/s");
@@ -499,7 +478,7 @@ mod tests {
     #[test]
     fn a_held_lvlh_attitude_turns_once_an_orbit_backwards_about_the_cross_track_axis() {
         let mut rng = ChaCha12Rng::seed_from_u64(3);
-        let flight = Flight::draw(&mut rng, Freedom::of(Kind::Single, Manner::default()));
+        let flight = Flight::draw(&mut rng, Kind::Single, Manner::default());
         let k = flight.times_s.len() / 2;
         let l = lvlh(&flight.position_m[k], &flight.velocity_m_s[k]);
         let in_lvlh = l * (flight.body[k].inverse() * flight.rate_rad_s[k]);

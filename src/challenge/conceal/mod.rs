@@ -24,7 +24,7 @@ use rand_chacha::ChaCha12Rng;
 use crate::math::rms::rms_about_mean;
 use draw::{log_between, pick};
 use effect::{Drawn, Signal};
-use flight::{Event, Flight, Freedom};
+use flight::{Event, Flight};
 use force::Series;
 use matched::{CONFUSABLE_SNR, Matched};
 use noise::Noise;
@@ -162,7 +162,7 @@ struct Question {
 
 impl Question {
     fn draw(rng: &mut ChaCha12Rng, order: &Order, quieter: f64) -> Self {
-        let mut flight = Flight::draw(rng, Freedom::of(order.kind, order.manner));
+        let mut flight = Flight::draw(rng, order.kind, order.manner);
         let ids = ids(rng, order);
         for id in &ids {
             require(rng, &mut flight, id);

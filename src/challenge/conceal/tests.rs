@@ -79,7 +79,7 @@ fn a_single_attitude_question_has_more_than_one_answer() {
 #[test]
 fn the_twenty_second_files_carry_the_signal() {
     for seed in 0..12 {
-        let flight = Flight::draw(&mut ChaCha12Rng::seed_from_u64(seed), Freedom::of(Kind::One, Manner::default()));
+        let flight = Flight::draw(&mut ChaCha12Rng::seed_from_u64(seed), Kind::One, Manner::default());
         let fine = Signal::without(&flight, &[]).simulated;
         let coarse: Series = (0..fine.len())
             .map(|k| {

@@ -22,7 +22,7 @@ pub const EFFECT: Effect = Effect {
         step: 200.0,
         // A sensor in the open follows at once, one behind insulation late: either as likely.
         atom: Some(0.0),
-        range: [0.0, 28_800.0],
+        range: [0.0, LAG_S_MAX],
         ..Nonlinear::PLAIN
     }],
     grid,

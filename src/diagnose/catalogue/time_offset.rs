@@ -12,7 +12,13 @@ pub const EFFECT: Effect = Effect {
     source: "under 1 ng per second in a hold, large in manoeuvres",
     mistaken_for: &["an attitude latency (the same)"],
     linear: &[],
-    nonlinear: &[Nonlinear { name: "offset_s", unit: "s", step: 3.0, range: [-600.0, 600.0], ..Nonlinear::PLAIN }],
+    nonlinear: &[Nonlinear {
+        name: "offset_s",
+        unit: "s",
+        step: 3.0,
+        range: [-OFFSET_S_MAX, OFFSET_S_MAX],
+        ..Nonlinear::PLAIN
+    }],
     grid,
     log_density,
     signature,

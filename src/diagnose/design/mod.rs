@@ -18,6 +18,7 @@ pub use chosen::{Chosen, Normal};
 
 use crate::diagnose::noise::{AxisNoise, Loudness, Schedule, Stretch, Whitener, dot};
 use crate::diagnose::scene::Axes;
+use crate::math::rms::about_mean;
 use crate::math::shared_work;
 
 /// A regressor before whitening: a series for every axis it acts on.
@@ -199,11 +200,7 @@ impl Frame {
     /// The same filters, another residual.
     pub fn with_data(&self, residual_ng: &Axes) -> Self {
         // The constant is nuisance, however large: it goes before rounding can make anything of it.
-        let centred = residual_ng.each_ref().map(|series| {
-            let mean = series.iter().sum::<f64>() / series.len() as f64;
-            Some(series.iter().map(|x| x - mean).collect())
-        });
-        let data = self.column(&centred, 1.0);
+        let data = self.column(&residual_ng.each_ref().map(|series| Some(about_mean(series))), 1.0);
         let log_null = self.log_det - 0.5 * data.dot(&data);
         Self { data, log_null, ..self.clone() }
     }

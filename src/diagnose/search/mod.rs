@@ -4,6 +4,7 @@
 //! at hand. Sets grow from nothing in a beam, are refined in their nonlinear parameters, and are then weighed each with
 //! the noise fitted to its own residual: slow noise and a slow effect compete on equal terms. It decides nothing.
 
+mod entry;
 mod imitate;
 mod refine;
 mod volume;
@@ -11,11 +12,12 @@ mod weigh;
 
 use nalgebra::{DMatrix, DVector};
 
+pub use entry::{Entry, Family};
 pub use imitate::imitation;
 pub use refine::refine;
 pub use weigh::{Left, Weighed, fit_noise, residual, weigh_with_own_noise};
 
-use super::catalogue::{Effect, LOG_PRIOR, Shape, Theta};
+use super::catalogue::{Shape, Theta};
 use super::design::{Chosen, Column, Frame, Normal, OnAxis};
 use super::scene::{Axes, Scene};
 use crate::math::shared_work;
@@ -33,114 +35,6 @@ const CROWD: f64 = -4.0;
 
 fn crowd(members: usize) -> f64 {
     CROWD * members.saturating_sub(2) as f64
-}
-
-/// Size of a small effect, of its usual size.
-const SMALL: f64 = 0.2;
-
-/// What a family is.
-#[derive(Clone, Copy)]
-pub enum Family {
-    /// A catalogue effect.
-    Listed(&'static Effect),
-    /// An open form, by its place in the dictionary.
-    Open(usize),
-}
-
-/// A family with its series at every starting point, before whitening.
-pub struct Entry {
-    /// What it is.
-    pub family: Family,
-    /// Log prior odds.
-    pub log_prior: f64,
-    /// Starting points.
-    pub points: Vec<(Theta, Shape)>,
-    /// Log share of the prior that each of them stands for.
-    pub log_shares: Vec<f64>,
-    /// Prior sizes of the coefficients.
-    pub sizes: Vec<f64>,
-    /// Prior means of the coefficients, in their own units.
-    pub means: Vec<f64>,
-}
-
-impl Entry {
-    /// A catalogue effect, `None` where the case does not allow it.
-    pub fn listed(scene: &Scene, effect: &'static Effect) -> Option<Self> {
-        let grid = (effect.grid)(scene);
-        let at = |theta: &Theta| (effect.signature)(scene, theta).map(|shape| (*theta, shape));
-        let points: Vec<(Theta, Shape)> = shared_work::map(&grid, at).into_iter().flatten().collect();
-        (!points.is_empty()).then(|| Self {
-            family: Family::Listed(effect),
-            log_prior: LOG_PRIOR,
-            log_shares: log_shares(scene, effect, &points.iter().map(|(theta, _)| theta[0]).collect::<Vec<f64>>()),
-            points,
-            sizes: effect.linear.iter().map(|l| l.prior().size).collect(),
-            means: effect.linear.iter().map(|l| l.prior().mean).collect(),
-        })
-    }
-
-    /// An open form.
-    pub fn open(index: usize, shapes: Vec<Shape>, log_prior: f64) -> Self {
-        let count = match shapes.first() {
-            Some(Shape::Columns(columns)) => columns.len(),
-            _ => 3,
-        };
-        let sizes = vec![super::open_form::SIZE_NG; count];
-        Self {
-            family: Family::Open(index),
-            log_prior,
-            log_shares: equal(shapes.len()),
-            points: shapes.into_iter().enumerate().map(|(i, shape)| ([i as f64, 0.0], shape)).collect(),
-            sizes,
-            means: vec![0.0; count],
-        }
-    }
-
-    /// What the prior sizes may be multiplied by, each as likely: an effect is of its usual size or well below it.
-    fn scales(&self) -> &'static [f64] {
-        match self.family {
-            Family::Listed(effect) if effect.linear.is_empty() || effect.linear.iter().any(|l| l.whole) => &[1.0],
-            _ => &[1.0, SMALL],
-        }
-    }
-
-    /// Usual size of coefficient `k` where nothing is believed of it beforehand.
-    pub fn usual_size(&self, k: usize) -> f64 {
-        self.effect().and_then(|effect| effect.linear.get(k)).map_or_else(|| self.sizes[k], |l| l.size)
-    }
-
-    fn effect(&self) -> Option<&'static Effect> {
-        match self.family {
-            Family::Listed(effect) => Some(effect),
-            Family::Open(_) => None,
-        }
-    }
-}
-
-fn equal(points: usize) -> Vec<f64> {
-    vec![-(points as f64).ln(); points]
-}
-
-/// Log shares of the prior that starting points stand for, each with the stretch of its parameter half way to those beside it; a point
-/// that has half of the prior to itself has that. Equal where there is more than one parameter, or points in place of a continuum.
-fn log_shares(scene: &Scene, effect: &Effect, points: &[f64]) -> Vec<f64> {
-    let [parameter] = effect.nonlinear else { return equal(points.len()) };
-    if parameter.step == 0.0 || points.len() < 2 {
-        return equal(points.len());
-    }
-    let mut sorted = points.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let is_atom = |x: f64| parameter.atom == Some(x);
-    let mass = |x: &f64| {
-        let i = sorted.partition_point(|y| y < x);
-        let [before, after] = [i.saturating_sub(1), (i + 1).min(sorted.len() - 1)];
-        let stretch = (sorted[after] - sorted[before]) / (after - before) as f64;
-        if is_atom(*x) { 0.0 } else { (effect.log_density)(scene, &[*x, 0.0]).exp() * stretch }
-    };
-    let masses: Vec<f64> = points.iter().map(mass).collect();
-    let has_atom = points.iter().any(|x| is_atom(*x));
-    let whole = masses.iter().sum::<f64>() * if has_atom { 2.0 } else { 1.0 };
-    points.iter().zip(masses).map(|(x, mass)| if is_atom(*x) { 0.5_f64 } else { mass / whole }.ln()).collect()
 }
 
 /// A family at one point, whitened.
@@ -382,8 +276,6 @@ struct Way {
     scale: f64,
 }
 
-const NO_WAY: Way = Way { gain: f64::MIN, log_share: 0.0, point: 0, axis: None, scale: 1.0 };
-
 /// The best way to add one entry to a chosen set: the score gained with priors, and the member.
 pub fn best_of_entry(seen: &Seen, index: usize, chosen: &Chosen) -> (f64, Member) {
     let entry = &seen.bank.entries[index];
@@ -414,10 +306,12 @@ pub fn best_of_entry(seen: &Seen, index: usize, chosen: &Chosen) -> (f64, Member
             }
         }
     }
-    let best = ways.iter().max_by(|a, b| a.gain.total_cmp(&b.gain));
-    let &Way { gain: top, point: best, axis, scale, .. } = best.unwrap_or(&NO_WAY);
+    let Some(&best) = ways.iter().max_by(|a, b| a.gain.total_cmp(&b.gain)) else {
+        unreachable!("an entry has a point")
+    };
+    let Way { gain: top, axis, scale, .. } = best;
     let marginal = top + ways.iter().map(|w| (w.gain + w.log_share - top).exp()).sum::<f64>().ln();
-    let mut point = points[best].clone();
+    let mut point = points[best.point].clone();
     if let Some(axis) = axis {
         point.columns = vec![point.columns.swap_remove(axis)];
     }

@@ -1,6 +1,6 @@
 //! The nonlinear parameters of a set: their best values; and where columns that are only nearly linear are taken.
 
-use super::volume::{volume, with};
+use super::volume::{atom, volume};
 use super::{Entry, Member, Set, point_at, whiten};
 use crate::diagnose::catalogue::Theta;
 use crate::diagnose::design::Frame;
@@ -38,8 +38,10 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
             t
         };
         let refined = place(&nelder_mead(&start, &steps, 60, |p| -gain(&place(p))));
-        let atom = free.iter().find_map(|j| Some(with(&theta, *j, effect.nonlinear[*j].atom?)));
-        let places = [Some(theta), Some(refined), atom].into_iter().flatten().map(|theta| (gain(&theta), theta));
+        let places = [Some(theta), Some(refined), atom(&theta, &free, effect)]
+            .into_iter()
+            .flatten()
+            .map(|theta| (gain(&theta), theta));
         let best = places.filter(|(gain, _)| gain.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((peak, theta)) = best else { continue };
         let (log_occam, sigma) = volume(&gain, &theta, &free, effect, (effect.log_density)(scene, &theta), peak);

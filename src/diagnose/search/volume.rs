@@ -58,12 +58,17 @@ pub fn volume(
         log_volume += (area(gain, theta, *j, h[a], peak) / parabola).ln();
     }
     let log_share = (log_volume + log_density).min(0.0);
-    let atom = free.iter().find_map(|j| Some(gain(&with(theta, *j, effect.nonlinear[*j].atom?)) - peak));
-    (atom.map_or(log_share, |atom| (0.5 * (atom.exp() + log_share.exp())).ln()), sigma)
+    let at_atom = atom(theta, free, effect).map(|theta| gain(&theta) - peak);
+    (at_atom.map_or(log_share, |gain| (0.5 * (gain.exp() + log_share.exp())).ln()), sigma)
+}
+
+/// The parameters with one of `free` at the value that has half of the prior to itself, if there is one.
+pub(super) fn atom(theta: &Theta, free: &[usize], effect: &Effect) -> Option<Theta> {
+    free.iter().find_map(|j| Some(with(theta, *j, effect.nonlinear[*j].atom?)))
 }
 
 /// The parameters with another value of one.
-pub(super) fn with(theta: &Theta, j: usize, value: f64) -> Theta {
+fn with(theta: &Theta, j: usize, value: f64) -> Theta {
     let mut theta = *theta;
     theta[j] = value;
     theta

@@ -1,0 +1,151 @@
+//! What is searched: a catalogue effect or an open form, at its starting points, with its priors. Not here: whitening, and which is best.
+
+use crate::diagnose::catalogue::{Effect, LOG_PRIOR, Nonlinear, Shape, Theta};
+use crate::diagnose::open_form::SIZE_NG;
+use crate::diagnose::scene::Scene;
+use crate::math::shared_work;
+
+/// Size of a small effect, of its usual size.
+const SMALL: f64 = 0.2;
+
+/// What a family is.
+#[derive(Clone, Copy)]
+pub enum Family {
+    /// A catalogue effect.
+    Listed(&'static Effect),
+    /// An open form, by its place in the dictionary.
+    Open(usize),
+}
+
+/// A family with its series at every starting point, before whitening.
+pub struct Entry {
+    /// What it is.
+    pub family: Family,
+    /// Log prior odds.
+    pub log_prior: f64,
+    /// Starting points.
+    pub points: Vec<(Theta, Shape)>,
+    /// Log share of the prior that each of them stands for.
+    pub log_shares: Vec<f64>,
+    /// Prior sizes of the coefficients.
+    pub sizes: Vec<f64>,
+    /// Prior means of the coefficients, in their own units.
+    pub means: Vec<f64>,
+}
+
+impl Entry {
+    /// A catalogue effect, `None` where the case does not allow it.
+    pub fn listed(scene: &Scene, effect: &'static Effect) -> Option<Self> {
+        let grid = (effect.grid)(scene);
+        let at = |theta: &Theta| (effect.signature)(scene, theta).map(|shape| (*theta, shape));
+        let points: Vec<(Theta, Shape)> = shared_work::map(&grid, at).into_iter().flatten().collect();
+        (!points.is_empty()).then(|| Self {
+            family: Family::Listed(effect),
+            log_prior: LOG_PRIOR,
+            log_shares: log_shares(scene, effect, &points),
+            points,
+            sizes: effect.linear.iter().map(|l| l.prior().size).collect(),
+            means: effect.linear.iter().map(|l| l.prior().mean).collect(),
+        })
+    }
+
+    /// An open form.
+    pub fn open(index: usize, shapes: Vec<Shape>, log_prior: f64) -> Self {
+        let count = match shapes.first() {
+            Some(Shape::Columns(columns)) => columns.len(),
+            _ => 3,
+        };
+        let sizes = vec![SIZE_NG; count];
+        Self {
+            family: Family::Open(index),
+            log_prior,
+            log_shares: equal(shapes.len()),
+            points: shapes.into_iter().enumerate().map(|(i, shape)| ([i as f64, 0.0], shape)).collect(),
+            sizes,
+            means: vec![0.0; count],
+        }
+    }
+
+    /// What the prior sizes may be multiplied by, each as likely: an effect is of its usual size or well below it.
+    pub(super) fn scales(&self) -> &'static [f64] {
+        match self.family {
+            Family::Listed(effect) if effect.linear.is_empty() || effect.linear.iter().any(|l| l.whole) => &[1.0],
+            _ => &[1.0, SMALL],
+        }
+    }
+
+    /// Usual size of coefficient `k` where nothing is believed of it beforehand.
+    pub fn usual_size(&self, k: usize) -> f64 {
+        self.effect().and_then(|effect| effect.linear.get(k)).map_or_else(|| self.sizes[k], |l| l.size)
+    }
+
+    pub(super) fn effect(&self) -> Option<&'static Effect> {
+        match self.family {
+            Family::Listed(effect) => Some(effect),
+            Family::Open(_) => None,
+        }
+    }
+}
+
+fn equal(points: usize) -> Vec<f64> {
+    vec![-(points as f64).ln(); points]
+}
+
+/// Log shares of the prior that starting points stand for: equal where an effect has more than one parameter, or points in place of a
+/// continuum.
+fn log_shares(scene: &Scene, effect: &Effect, points: &[(Theta, Shape)]) -> Vec<f64> {
+    match effect.nonlinear {
+        [parameter] if parameter.step > 0.0 && points.len() > 1 => {
+            let values: Vec<f64> = points.iter().map(|(theta, _)| theta[0]).collect();
+            log_shares_along(parameter, |x| (effect.log_density)(scene, &[x, 0.0]), &values)
+        }
+        _ => equal(points.len()),
+    }
+}
+
+/// Of points along one parameter, each with the stretch half way to those beside it; one that has half of the prior to itself has that.
+fn log_shares_along(parameter: &Nonlinear, log_density: impl Fn(f64) -> f64, points: &[f64]) -> Vec<f64> {
+    let mut sorted = points.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let is_atom = |x: f64| parameter.atom == Some(x);
+    let mass = |x: &f64| {
+        let i = sorted.partition_point(|y| y < x);
+        let [before, after] = [i.saturating_sub(1), (i + 1).min(sorted.len() - 1)];
+        let stretch = (sorted[after] - sorted[before]) / (after - before) as f64;
+        if is_atom(*x) { 0.0 } else { log_density(*x).exp() * stretch }
+    };
+    let masses: Vec<f64> = points.iter().map(mass).collect();
+    let has_atom = points.iter().any(|x| is_atom(*x));
+    let whole = masses.iter().sum::<f64>() * if has_atom { 2.0 } else { 1.0 };
+    points.iter().zip(masses).map(|(x, mass)| if is_atom(*x) { 0.5_f64 } else { mass / whole }.ln()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::catalogue::by_id;
+
+    fn shares(id: &str, log_density: impl Fn(f64) -> f64, points: &[f64]) -> Vec<f64> {
+        let parameter = &by_id(id).unwrap().nonlinear[0];
+        let shares: Vec<f64> = log_shares_along(parameter, log_density, points).iter().map(|s| s.exp()).collect();
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{shares:?}");
+        shares
+    }
+
+    #[test]
+    fn points_share_the_prior_by_its_density_and_their_stretch() {
+        let even = shares("bias_step", |_| -7.0, &[30.0, 10.0, 20.0]);
+        assert!(even.iter().all(|s| (s - 1.0 / 3.0).abs() < 1e-12), "{even:?}");
+        // Stretches of 10, 20 and 30.
+        let wider = shares("bias_step", |_| -7.0, &[10.0, 20.0, 50.0]);
+        assert!(
+            wider.iter().zip([10.0, 20.0, 30.0]).all(|(s, stretch)| (s - stretch / 60.0).abs() < 1e-12),
+            "{wider:?}"
+        );
+        let falling = shares("bias_step", |x| -x, &[0.0, 1.0, 2.0]);
+        assert!((falling[0] / falling[1] - std::f64::consts::E).abs() < 1e-12, "{falling:?}");
+        // No lag at all has half of the prior.
+        let lags = shares("temperature_bias", |_| -3.0, &[0.0, 100.0, 200.0]);
+        assert!(lags.iter().zip([0.5, 0.25, 0.25]).all(|(s, share)| (s - share).abs() < 1e-12), "{lags:?}");
+    }
+}
