@@ -66,6 +66,8 @@ pub struct Prepared<'a> {
     scene: Scene<'a>,
     library: Library,
     solution: Solution,
+    /// Log posterior odds of the best hypothesis against nothing, as far as they are proof.
+    statistic: f64,
     settings: Settings,
 }
 
@@ -81,29 +83,29 @@ impl<'a> Prepared<'a> {
         let Some(solution) = solve_beside_bursts(&mut scene, &library, noise, &|| false) else {
             unreachable!("nobody asked to stop")
         };
-        Ok(Self { scene, library, solution, settings: settings.clone() })
+        let statistic = solution.proven(&scene, &library.entries);
+        Ok(Self { scene, library, solution, statistic, settings: settings.clone() })
     }
 
     /// The bootstrap of this case, under the noise of the best hypothesis: its residual holds no effect.
     pub fn bootstrap(&self) -> Bootstrap<'_> {
-        Bootstrap::new(
-            &self.scene,
-            &self.library,
-            self.solution.best().noise,
-            self.settings.seed,
-            self.solution.statistic(),
-        )
+        Bootstrap::new(&self.scene, &self.library, self.solution.best().noise, self.settings.seed, self.statistic)
     }
 
     /// False-alarm probability, from the bootstrap where there was one, else from the table of nulls, and verdict.
     pub fn conclude(&self, reached: Option<Reached>) -> Analysis {
-        let table = null_table::false_alarm_probability(self.solution.statistic(), self.solution.null.slow_evidence);
+        let table = null_table::false_alarm_probability(self.statistic, self.solution.null.slow_evidence);
         let decisive = match reached {
             // Few replicates cannot show a small probability: then the table decides, and the bootstrap may only forbid.
             Some(r) if r.least <= self.settings.claim_probability || r.probability > 3.0 * r.least => r.probability,
             _ => table,
         };
-        let proof = Proof { probability: decisive, claim: self.settings.claim_probability, chances: 1.0 };
+        let proof = Proof {
+            statistic: self.statistic,
+            probability: decisive,
+            claim: self.settings.claim_probability,
+            chances: 1.0,
+        };
         let (diagnosis, model_ng, ladder) = verdict::conclude(&self.scene, &self.library, &self.solution, proof);
         Analysis { plates: plates(&self.scene, model_ng, ladder), diagnosis }
     }

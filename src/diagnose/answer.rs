@@ -13,7 +13,8 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Probability that a record without any mismatch scores as high as this one did.
     pub false_alarm_probability: f64,
-    /// The statistic behind it: log posterior odds of the best hypothesis against none.
+    /// The statistic behind it: log posterior odds of the best hypothesis against none, less what they owe to noise that is louder than
+    /// the noise fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub statistic: Option<f64>,
     /// Log likelihood of slow noise above that of hardly any, when nothing is left out: what the statistic is compared with depends

@@ -233,9 +233,10 @@ impl Live {
         );
         let Some(solution) = solve_beside_bursts(&mut scene, &library, noise, stop) else { return false };
         self.noise = Some(solution.null.noise);
-        let log_odds = solution.statistic();
+        let log_odds = solution.proven(&scene, &library.entries);
         let clock_s = scene.clock_s();
         let proof = Proof {
+            statistic: log_odds,
             probability: anytime_probability(log_odds),
             claim: self.policy.claim_probability,
             chances: chances_at(self.milestones.searches + 1),

@@ -4,7 +4,8 @@ use super::catalogue::{self, Effect};
 use super::design::Frame;
 use super::noise::AxisNoise;
 use super::open_form::{self, Said};
-use super::scene::Scene;
+use super::remains;
+use super::scene::{Axes, Scene};
 use super::search::{self, Bank, Entry, SET_MAX, Seen, Set, Weighed};
 use crate::math::shared_work;
 
@@ -83,6 +84,25 @@ impl Solution {
     pub fn statistic(&self) -> f64 {
         let best = self.listed.iter().chain(&self.open).map(|w| w.log_posterior).fold(f64::NEG_INFINITY, f64::max);
         best - self.null.log_posterior
+    }
+
+    /// The same as far as it is proof: where what the best hypothesis leaves is louder than the noise fitted to it, at the periods at
+    /// which the hypothesis lives, its gain in likelihood is worth less by that factor.
+    pub fn proven(&self, scene: &Scene, entries: &[Entry]) -> f64 {
+        let (best, statistic) = (self.best(), self.statistic());
+        if best.set.members.is_empty() {
+            return statistic;
+        }
+        let frame = best.frame(scene);
+        let left = best.left(scene, entries);
+        let signal: Axes = std::array::from_fn(|k| {
+            let before = frame.data.projected(k, &frame);
+            before.iter().zip(&left.whitened[k]).map(|(before, left)| before - left).collect()
+        });
+        let energy: f64 = signal.iter().flatten().map(|x| x * x).sum();
+        // What the set pays for its sizes, shapes and prior comes off the likelihood it gains, and stays as it is.
+        let paid = (0.5 * energy - best.set.score).max(0.0);
+        statistic - (1.0 - remains::loudness_under(&left, &scene.schedule, &signal).recip()) * (statistic + paid)
     }
 
     /// Log posterior odds of the best open hypothesis against the best listed one (or nothing, if that is better).

@@ -3,6 +3,7 @@
 mod bursts;
 mod dump;
 mod separating;
+mod smooth;
 mod trial;
 mod wind;
 

@@ -89,6 +89,9 @@ pub struct Manner {
     pub hours: u32,
     /// Winds, density waves and panels of its own.
     pub other_physics: bool,
+    /// Slow noise, where there is some, is smooth: its spectrum falls as the eighth power of frequency where that of an autoregression
+    /// falls as the square.
+    pub smooth: bool,
     /// Bursts in the noise, which the SNR does not know of.
     pub bursts: bool,
     /// The recording is a dump of the payload recorder: the simulator's instrument feels what the flight has, calibrates itself, and
@@ -99,7 +102,7 @@ pub struct Manner {
 impl Default for Manner {
     /// As the open cases are.
     fn default() -> Self {
-        Self { hours: 36, other_physics: false, bursts: false, dump: false }
+        Self { hours: 36, other_physics: false, smooth: false, bursts: false, dump: false }
     }
 }
 
@@ -167,7 +170,7 @@ impl Question {
         for id in &ids {
             require(rng, &mut flight, id);
         }
-        let mut noise = Noise::draw(rng, order.kind == Kind::Slow, order.manner.bursts);
+        let mut noise = Noise::draw(rng, order.kind == Kind::Slow, order.manner);
         let floor = 55.0 / noise.awake_ng[0];
         let factor = (1.0 - quieter).max(floor).min(1.0);
         noise.awake_ng = noise.awake_ng.map(|level| level * factor);
@@ -254,6 +257,7 @@ impl Question {
     fn written(self, rng: &mut ChaCha12Rng, order: &Order) -> Concealed {
         let mut suffix = String::new();
         suffix += if order.manner.other_physics { "-other" } else { "" };
+        suffix += if order.manner.smooth { "-smooth" } else { "" };
         suffix += if order.manner.bursts { "-bursts" } else { "" };
         suffix += if order.manner.dump { "-dump" } else { "" };
         let id = format!("{}-{:06}{suffix}", order.kind.word(), order.seed);

@@ -6,6 +6,7 @@
 
 use rand_chacha::ChaCha12Rng;
 
+use super::Manner;
 use super::draw::{between, log_between, normal};
 use crate::diagnose::case::WINDOW_STRIDE_S;
 
@@ -24,6 +25,8 @@ pub struct Noise {
     pub slow_ng: [f64; 3],
     /// Its correlation time, s.
     pub slow_s: f64,
+    /// Whether the slow noise is smooth: an autoregression seen through three lags of its own memory.
+    pub smooth: bool,
     /// Whether one half window in a hundred is ten times as loud.
     pub bursts: bool,
 }
@@ -33,7 +36,7 @@ const BURSTS: [f64; 2] = [0.01, 10.0];
 
 impl Noise {
     /// Draws one; `slow` puts up to 30 ng of noise with 5 min to 3 h of memory beside the rest.
-    pub fn draw(rng: &mut ChaCha12Rng, slow: bool, bursts: bool) -> Self {
+    pub fn draw(rng: &mut ChaCha12Rng, slow: bool, manner: Manner) -> Self {
         let x_ng = log_between(rng, 55.0, 330.0);
         let awake_ng = [x_ng, x_ng * between(rng, 0.45, 0.50), x_ng * between(rng, 0.56, 0.62)];
         let slow_ng = std::array::from_fn(|_| if slow { between(rng, 5.0, 30.0) } else { 0.0 });
@@ -44,23 +47,24 @@ impl Noise {
             red_s: log_between(rng, 100.0, 500.0),
             slow_ng,
             slow_s: log_between(rng, 300.0, 10_800.0),
-            bursts,
+            smooth: manner.smooth,
+            bursts: manner.bursts,
         }
     }
 
     /// One series of `windows` values for an axis; `awake` in 0..=1 scales between the two levels.
     pub fn series(&self, rng: &mut ChaCha12Rng, axis: usize, awake: &[f64]) -> Vec<f64> {
         let (white, red) = ((1.0 - self.red_share).sqrt(), self.red_share.sqrt());
-        let (red_keep, slow_keep) = (keep(self.red_s), keep(self.slow_s));
-        let (mut before, mut red_now, mut slow_now) = (normal(rng), normal(rng), normal(rng));
+        let red_keep = keep(self.red_s);
+        let (mut before, mut red_now) = (normal(rng), normal(rng));
+        let mut slow = Slow::new(rng, self);
         let mut series = Vec::with_capacity(awake.len());
         for awake in awake {
             let is_burst = self.bursts && between(rng, 0.0, 1.0) < BURSTS[0];
             let half = normal(rng) * if is_burst { BURSTS[1] } else { 1.0 };
             red_now = red_keep * red_now + (1.0 - red_keep * red_keep).sqrt() * normal(rng);
-            slow_now = slow_keep * slow_now + (1.0 - slow_keep * slow_keep).sqrt() * normal(rng);
             let quick = white * (half + before) / 2f64.sqrt() + red * red_now;
-            series.push(self.level_ng(axis, *awake) * quick + self.slow_ng[axis] * slow_now);
+            series.push(self.level_ng(axis, *awake) * quick + self.slow_ng[axis] * slow.next(rng));
             before = half;
         }
         series
@@ -68,13 +72,8 @@ impl Noise {
 
     /// The slow part alone, of an axis, on a grid of so many windows.
     pub fn slow_series(&self, rng: &mut ChaCha12Rng, axis: usize, windows: usize) -> Vec<f64> {
-        let keep = keep(self.slow_s);
-        let mut now = normal(rng);
-        let mut next = || {
-            now = keep * now + (1.0 - keep * keep).sqrt() * normal(rng);
-            self.slow_ng[axis] * now
-        };
-        (0..windows).map(|_| next()).collect()
+        let mut slow = Slow::new(rng, self);
+        (0..windows).map(|_| self.slow_ng[axis] * slow.next(rng)).collect()
     }
 
     /// Standard deviation of the quick part, ng.
@@ -114,6 +113,49 @@ impl Noise {
             })
             .collect();
         Whitening { steps, keep }
+    }
+}
+
+/// Lags of smooth slow noise, and the lag at which its correlation is 1/e over the memory of each (a Matern correlation of order 7/2).
+const LAGS: usize = 3;
+const MEMORIES: f64 = 3.5;
+
+/// Slow noise of unit variance, window by window.
+struct Slow {
+    keep: f64,
+    /// The autoregression, and what each lag makes of the one before.
+    states: [f64; 1 + LAGS],
+    /// The last of them, and its standard deviation.
+    last: usize,
+    sd: f64,
+}
+
+impl Slow {
+    fn new(rng: &mut ChaCha12Rng, noise: &Noise) -> Self {
+        if !noise.smooth {
+            return Self { keep: keep(noise.slow_s), states: [normal(rng), 0.0, 0.0, 0.0], last: 0, sd: 1.0 };
+        }
+        let memory_s = noise.slow_s / MEMORIES;
+        let mut slow = Self { keep: keep(memory_s), states: [0.0; 1 + LAGS], last: LAGS, sd: 1.0 };
+        let settles = (30.0 * memory_s / WINDOW_STRIDE_S) as usize;
+        let response: Vec<f64> = (0..settles).map(|k| slow.step(f64::from(u8::from(k == 0)))).collect();
+        slow.sd = response.iter().map(|x| x * x).sum::<f64>().sqrt();
+        for _ in 0..settles {
+            slow.next(rng);
+        }
+        slow
+    }
+
+    fn step(&mut self, normal: f64) -> f64 {
+        self.states[0] = self.keep * self.states[0] + (1.0 - self.keep * self.keep).sqrt() * normal;
+        for i in 1..=self.last {
+            self.states[i] = self.keep * self.states[i] + (1.0 - self.keep) * self.states[i - 1];
+        }
+        self.states[self.last] / self.sd
+    }
+
+    fn next(&mut self, rng: &mut ChaCha12Rng) -> f64 {
+        self.step(normal(rng))
     }
 }
 
@@ -179,7 +221,7 @@ mod tests {
     #[test]
     fn whitened_noise_is_white_and_of_unit_variance() {
         let mut rng = ChaCha12Rng::seed_from_u64(1);
-        let noise = Noise::draw(&mut rng, true, false);
+        let noise = Noise::draw(&mut rng, true, Manner::default());
         let windows = 40_000;
         let awake: Vec<f64> = (0..windows).map(|k| f64::from(u8::from(k % 3456 > 1152))).collect();
         let kept: Vec<bool> = (0..windows).map(|k| k % 600 > 38).collect();
@@ -193,5 +235,19 @@ mod tests {
             let c = white.iter().zip(&white[lag..]).map(|(a, b)| a * b).sum::<f64>() / n;
             assert!(c.abs() < 6.0 / n.sqrt() + 0.01, "lag {lag}: {c}");
         }
+    }
+    #[test]
+    fn smooth_slow_noise_has_the_size_and_the_memory_that_are_said() {
+        let mut rng = ChaCha12Rng::seed_from_u64(2);
+        let manner = Manner { smooth: true, ..Manner::default() };
+        let noise = Noise { slow_ng: [20.0; 3], slow_s: 1000.0, ..Noise::draw(&mut rng, true, manner) };
+        let windows = 400_000;
+        let series = noise.slow_series(&mut rng, 0, windows);
+        let at = |lag: usize| series.iter().zip(&series[lag..]).map(|(a, b)| a * b).sum::<f64>() / windows as f64;
+        // Ten thousand memories: 400 ng2 and 1/e within a few parts in a hundred; and it does not jump: an autoregression of this
+        // memory is 0.975 like itself a window on.
+        assert!((at(0) / 400.0 - 1.0).abs() < 0.1, "{}", at(0));
+        assert!((at(40) / at(0) - (-1f64).exp()).abs() < 0.06, "{}", at(40) / at(0));
+        assert!(at(1) / at(0) > 0.998, "{}", at(1) / at(0));
     }
 }

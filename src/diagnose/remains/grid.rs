@@ -1,10 +1,19 @@
 //! Whitened residuals on an even grid, and their spectra.
 
+use std::f64::consts::LN_2;
+
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 
 use crate::diagnose::case::{WINDOW_STRIDE_S, WINDOWS_MIN};
 use crate::diagnose::scene::Axes;
+
+/// Fewest lines to either side that say how loud a spectrum is.
+const LINES_ABOUT: usize = 16;
+/// Usual logarithm of a whitened spectrum's departure from white.
+const EXCESS: f64 = 0.3;
+/// Lines of the spectrum below a band over which it is taken to be even, for each line of the band.
+const BANDS: usize = 8;
 
 /// The residuals on an even grid, zero where there is no window.
 pub(super) struct Grid {
@@ -18,34 +27,75 @@ pub(super) struct Grid {
     fft: std::sync::Arc<dyn Fft<f64>>,
 }
 
+/// Place of an instant.
+fn place(first_s: f64, clock_s: f64) -> usize {
+    ((clock_s - first_s) / WINDOW_STRIDE_S).round() as usize
+}
+
+/// A series at its places, zero elsewhere.
+fn laid_out(clock_s: &[f64], series: &[f64], length: usize) -> Vec<Complex64> {
+    let mut out = vec![Complex64::ZERO; length];
+    for (t, x) in clock_s.iter().zip(series) {
+        out[place(clock_s[0], *t)] += x;
+    }
+    out
+}
+
 impl Grid {
     /// `None` where there are too few windows, or too many.
     pub fn new(clock_s: &[f64], whitened: &Axes) -> Option<Self> {
         let (first, last) = (*clock_s.first()?, *clock_s.last()?);
-        let place = |t: &f64| ((t - first) / WINDOW_STRIDE_S).round() as usize;
-        let record = place(&last) as f64;
-        let length = (place(&last) + 1).next_power_of_two();
+        let last = place(first, last);
+        let length = (last + 1).next_power_of_two();
         // A record of a few minutes has no bands; one of years is not of this kind.
         if clock_s.len() < WINDOWS_MIN || length > 1 << 20 {
             return None;
         }
         let mut variance = [0.0; 3];
         let series = std::array::from_fn(|k| {
-            let mut out = vec![Complex64::ZERO; length];
-            for (t, x) in clock_s.iter().zip(&whitened[k]) {
-                out[place(t)] += x;
-            }
             variance[k] = whitened[k].iter().map(|x| x * x).sum::<f64>() / clock_s.len() as f64;
-            out
+            laid_out(clock_s, &whitened[k], length)
         });
         let fft = FftPlanner::new().plan_fft_forward(length);
         variance.iter().all(|v| *v > 0.0).then_some(Self {
             series,
             variance,
             windows: clock_s.len() as f64,
-            record,
+            record: last as f64,
             fft,
         })
+    }
+
+    /// How loud a spectrum is about one of its lines beside that of white noise, 1 at least: from the median of the lines about it, from a
+    /// half of its frequency to one and a half, which no single line moves, and as far as they are enough to say so.
+    pub fn loudness(&self, spectrum: &[Complex64], m: usize) -> f64 {
+        let reach = LINES_ABOUT.max(m / 2);
+        let about = m.saturating_sub(reach).max(1)..(m + reach + 1).min(spectrum.len());
+        let mut power: Vec<f64> = spectrum[about].iter().map(Complex64::norm_sqr).collect();
+        let middle = power.len() / 2;
+        let (_, median, _) = power.select_nth_unstable_by(middle, f64::total_cmp);
+        let excess = (*median / LN_2).ln();
+        // Variance of the logarithm of a median of exponential numbers, as many as the windows fill of the grid.
+        let variance = self.length() as f64 / (self.windows * power.len() as f64 * LN_2.powi(2));
+        (excess * EXCESS.powi(2) / (EXCESS.powi(2) + variance)).exp().max(1.0)
+    }
+
+    /// How loud what is on the grid is beside white noise, a mean over all lines and axes with the power that `signal` has there.
+    pub fn loudness_under(&self, clock_s: &[f64], signal: &Axes) -> f64 {
+        let (mut louder, mut all) = (0.0, 0.0);
+        for (spectrum, series) in self.spectra(0.0).iter().zip(signal) {
+            let mut transform = laid_out(clock_s, series, self.length());
+            self.fft.process(&mut transform);
+            let mut m = 1;
+            while m < self.length() / 2 {
+                let next = (m + 1 + m / BANDS).min(self.length() / 2);
+                let power: f64 = transform[m..next].iter().map(Complex64::norm_sqr).sum();
+                louder += power * self.loudness(spectrum, m);
+                all += power;
+                m = next;
+            }
+        }
+        if all > 0.0 { louder / all } else { 1.0 }
     }
 
     /// Places in all.
@@ -84,5 +134,51 @@ pub mod tests {
 
     pub fn clock(n: usize) -> Vec<f64> {
         (0..n).filter(|i| i % 170 > 4).map(|i| 1000.0 + WINDOW_STRIDE_S * i as f64).collect()
+    }
+
+    /// White noise, and what is louder by `gain` in amplitude about periods of 1500 s: an autoregression of the second order.
+    pub fn coloured(seed: u64, n: usize, gain: f64) -> Axes {
+        let radius = (-WINDOW_STRIDE_S / 1500.0f64).exp();
+        let turn = 2.0 * radius * (std::f64::consts::TAU * WINDOW_STRIDE_S / 1500.0).cos();
+        let driven = white(seed + 1_000_000, n).map(|series| {
+            let mut last = [0.0; 2];
+            let resonant = series.iter().map(|x| {
+                last = [x + turn * last[0] - radius * radius * last[1], last[0]];
+                last[0]
+            });
+            resonant.collect::<Vec<f64>>()
+        });
+        let mut all = white(seed, n);
+        for (axis, driven) in all.iter_mut().zip(&driven) {
+            let peak = (1.0 - radius) * 2.0 * (std::f64::consts::TAU * WINDOW_STRIDE_S / 1500.0).sin();
+            axis.iter_mut().zip(driven).for_each(|(x, d)| *x += gain * peak * d);
+        }
+        all
+    }
+
+    #[test]
+    fn noise_is_as_loud_as_it_was_made_where_it_was_and_one_line_is_no_noise() {
+        let clock = clock(5000);
+        let about = |grid: &Grid, period_s: f64| {
+            let m = (grid.span_s() / period_s) as usize;
+            grid.spectra(0.0).iter().map(|spectrum| grid.loudness(spectrum, m)).sum::<f64>() / 3.0
+        };
+        let of = |axes: &Axes| Grid::new(&clock, axes).unwrap();
+        let sine = |period_s: f64| -> Axes {
+            std::array::from_fn(|_| clock.iter().map(|t| (std::f64::consts::TAU * t / period_s).sin()).collect())
+        };
+        for seed in 0..10 {
+            let (even, loud) = (of(&white(seed, clock.len())), of(&coloured(seed, clock.len(), 2.0)));
+            assert!(about(&even, 1500.0) < 1.3, "{seed}: {}", about(&even, 1500.0));
+            assert!(about(&loud, 1500.0) > 1.6 && about(&loud, 200.0) < 1.2, "{seed}: {}", about(&loud, 1500.0));
+            // What a signal sees of it depends on where the signal is.
+            let [here, there] = [1500.0, 200.0].map(|period_s| loud.loudness_under(&clock, &sine(period_s)));
+            assert!(here > 1.6 && there < 1.2, "{seed}: {here} {there}");
+        }
+        let mut axes = white(3, clock.len());
+        let before = about(&of(&axes), 1500.0);
+        axes.iter_mut().zip(sine(1500.0)).for_each(|(axis, s)| axis.iter_mut().zip(s).for_each(|(x, s)| *x += s));
+        // It has half as much power as all the rest, which is a third less beside the whole.
+        assert!(about(&of(&axes), 1500.0) < before + 0.1);
     }
 }

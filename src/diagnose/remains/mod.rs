@@ -4,6 +4,9 @@
 //! do the axes move together in some band of periods (a push along one direction of the body at whatever instants does that), and
 //! is there a line, of constant or of steadily drifting period? And one to the residual itself: does it switch between two levels,
 //! where slow noise would wander? Not here: what it could be.
+//!
+//! Slow noise that is no autoregression is not white behind the filter of one: what is left is louder in some band than the noise
+//! fitted. Lines, and findings, are measured by how loud it is where they are.
 
 mod chain;
 mod grid;
@@ -13,6 +16,7 @@ mod together;
 
 use self::grid::Grid;
 use super::noise::{AxisNoise, Binned, Loudness, Schedule};
+use super::scene::Axes;
 use super::search::Left;
 
 /// Structure that remains.
@@ -53,6 +57,11 @@ pub fn strongest(
         .map(|r| Remains { probability: (questions * r.probability).min(1.0), ..r })
 }
 
+/// How loud what a hypothesis leaves is, beside the noise fitted to it, at the periods at which a whitened signal lives.
+pub fn loudness_under(left: &Left, schedule: &Schedule, signal: &Axes) -> f64 {
+    Grid::new(&schedule.clock_s, &left.whitened).map_or(1.0, |grid| grid.loudness_under(&schedule.clock_s, signal))
+}
+
 /// Axes that carry at least a twentieth of the energy.
 fn sharing(amplitude: [f64; 3]) -> Vec<String> {
     let total: f64 = amplitude.iter().map(|a| a * a).sum();
@@ -64,7 +73,6 @@ fn sharing(amplitude: [f64; 3]) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::diagnose::noise::{Whitener, simulate};
-    use crate::diagnose::scene::Axes;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 

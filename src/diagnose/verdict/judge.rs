@@ -37,7 +37,7 @@ pub fn judge<'a>(
     library: &Library,
     solution: &'a Solution,
     listed: &[&'a Weighed],
-    Proof { probability, claim, .. }: Proof,
+    Proof { statistic, probability, claim, .. }: Proof,
 ) -> Judged<'a> {
     let height = |w: Option<&Weighed>| w.map_or(f64::NEG_INFINITY, |w| w.log_posterior);
     let null = solution.null.log_posterior;
@@ -55,7 +55,7 @@ pub fn judge<'a>(
         (true, false, false) => (Verdict::Explained, Some(simplest(listed))),
     };
     let on_trial = chosen.map(|weighed| (weighed, tried(scene, library, weighed)));
-    let failure = on_trial.as_ref().and_then(|(_, tried)| fails(tried, solution.statistic()));
+    let failure = on_trial.as_ref().and_then(|(_, tried)| fails(tried, statistic));
     let (verdict, on_trial) = match &failure {
         Some(_) if probability > BEYOND_DOUBT * claim => (Verdict::Consistent, None),
         Some(_) => (Verdict::Unexplained, on_trial),

@@ -40,9 +40,14 @@ const REMAINS_SHARE: f64 = 0.03;
 /// several times the usual towards it by a standard error; and bound only what the record cannot say at all.
 const TOLD: f64 = 3.0;
 
+/// Log evidence lost to noise that is not white, from which on it is told.
+const TOLD_OF_COLOUR: f64 = 1.0;
+
 /// What proof there is, and what is asked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Proof {
+    /// Log posterior odds against nothing, as far as they are proof.
+    pub statistic: f64,
     /// Probability that noise reaches the evidence of this record.
     pub probability: f64,
     /// Probability of a false alarm at or below which something is claimed.
@@ -98,6 +103,7 @@ fn of_the_mismatch(
     proof: Proof,
 ) -> (Diagnosis, Axes, Vec<(String, f64)>) {
     let mut notes = of_windows(scene);
+    notes.extend(of_colour(solution.statistic() - proof.statistic));
     let listed = credible(scene, library, &solution.listed, &mut notes);
     let judged = judge(scene, library, solution, &listed, proof);
     let Judged { open_wins, refused, failure, .. } = judged;
@@ -107,7 +113,7 @@ fn of_the_mismatch(
     let tried = judged.on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
     let least = remains.as_ref().map_or(1.0, |r| r.probability);
     let overall = (proof.probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
-    let statistic = Some(solution.statistic());
+    let statistic = Some(proof.statistic);
     let slow_evidence = Some(solution.null.slow_evidence);
     let mut answer =
         Diagnosis { verdict, statistic, slow_evidence, ..Diagnosis::nothing(&scene.case.header.id, overall) };
@@ -182,6 +188,16 @@ fn of_windows(scene: &Scene) -> Vec<String> {
         ));
     }
     notes
+}
+
+/// Says by how much evidence was lessened, where that may matter.
+fn of_colour(lessened: f64) -> Option<String> {
+    (lessened > TOLD_OF_COLOUR).then(|| {
+        format!(
+            "what remains is louder than the noise fitted at the periods of the best hypothesis: {lessened:.1} of its log \
+             evidence is no proof"
+        )
+    })
 }
 
 /// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.
