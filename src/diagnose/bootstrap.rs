@@ -42,7 +42,7 @@ pub struct Bootstrap<'a> {
     seed: u64,
     frame: Frame,
     bank: Bank<'a>,
-    /// Statistic that is asked about.
+    /// Statistic that is asked about, less what is no proof; replicates have noise as fitted, and owe it nothing.
     asked: f64,
 }
 

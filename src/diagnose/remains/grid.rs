@@ -7,6 +7,7 @@ use rustfft::{Fft, FftPlanner};
 
 use crate::diagnose::case::{WINDOW_STRIDE_S, WINDOWS_MIN};
 use crate::diagnose::scene::Axes;
+use crate::math::robust::median;
 
 /// Fewest lines to either side that say how loud a spectrum is.
 const LINES_ABOUT: usize = 16;
@@ -72,9 +73,8 @@ impl Grid {
         let reach = LINES_ABOUT.max(m / 2);
         let about = m.saturating_sub(reach).max(1)..(m + reach + 1).min(spectrum.len());
         let mut power: Vec<f64> = spectrum[about].iter().map(Complex64::norm_sqr).collect();
-        let middle = power.len() / 2;
-        let (_, median, _) = power.select_nth_unstable_by(middle, f64::total_cmp);
-        let excess = (*median / LN_2).ln();
+        let Some(middle) = median(&mut power) else { return 1.0 };
+        let excess = (middle / LN_2).ln();
         // Variance of the logarithm of a median of exponential numbers, as many as the windows fill of the grid.
         let variance = self.length() as f64 / (self.windows * power.len() as f64 * LN_2.powi(2));
         (excess * EXCESS.powi(2) / (EXCESS.powi(2) + variance)).exp().max(1.0)
