@@ -12,6 +12,7 @@ pub mod bursts;
 pub mod case;
 pub mod catalogue;
 pub mod design;
+mod earlier;
 pub mod error;
 pub mod live;
 pub mod locate;

@@ -10,6 +10,7 @@ use crate::physics::{self, Mat3, Vec3};
 use crate::units::NANO_G_M_S2;
 
 use super::case::{Case, Expectation, HALF_WINDOW_S, Header};
+use super::earlier;
 use super::error::CaseError;
 use super::measure::{Measurement, coverage};
 use super::noise::{Loudness, Schedule};
@@ -71,6 +72,8 @@ pub struct Scene<'a> {
     pub simulated_ng: Axes,
     /// From the ancillary grid to the windows.
     pub measurement: Measurement,
+    /// The sensor temperature with what its cycles tell of it before the ancillary grid.
+    pub temperature_and_earlier: Arc<earlier::Series>,
     surroundings: Arc<Surroundings>,
 }
 
@@ -207,6 +210,11 @@ impl<'a> Scene<'a> {
             residual_ng,
             simulated_ng,
             measurement: Measurement::new(&surroundings.grid_s, windows),
+            temperature_and_earlier: Arc::new(earlier::with_earlier(
+                &surroundings.grid_s,
+                &surroundings.temperature_c,
+                surroundings.period_s,
+            )),
             surroundings,
             case,
         }

@@ -2,6 +2,7 @@
 
 mod bursts;
 mod dump;
+mod lag;
 mod separating;
 mod smooth;
 mod trial;

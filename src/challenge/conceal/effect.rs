@@ -138,7 +138,7 @@ impl Drawn {
             "misalignment" => triple(&mut p, ["rx_rad", "ry_rad", "rz_rad"], direction(rng) * 0.05),
             "temperature_bias" => {
                 triple(&mut p, ["slope_x_ng_per_c", "slope_y_ng_per_c", "slope_z_ng_per_c"], direction(rng) * 50.0);
-                p.push(("lag_s".into(), if rng.random_bool(0.6) { 0.0 } else { between(rng, 300.0, 7200.0) }));
+                p.push(("lag_s".into(), if rng.random_bool(0.6) { 0.0 } else { between(rng, 300.0, 28_800.0) }));
             }
             "time_offset" => p.push(("offset_s".into(), if rng.random_bool(0.5) { 60.0 } else { -60.0 })),
             "thermospheric_wind" => {
@@ -272,7 +272,7 @@ impl Drawn {
             "temperature_bias" => {
                 let slope = Vector3::from_fn(|i, _| self.number(&format!("slope_{}_ng_per_c", AXES[i])));
                 let lag = self.number("lag_s") / STEP_S;
-                (0..n).map(|k| slope * (at(&flight.temperature_c, k as f64 - lag) - flight.temperature_c[0])).collect()
+                (0..n).map(|k| slope * (flight.temperature_at(k as f64 - lag) - flight.temperature_c[0])).collect()
             }
             "time_offset" => {
                 let lag = self.number("offset_s") / STEP_S;

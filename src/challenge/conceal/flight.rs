@@ -8,6 +8,8 @@ use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 
 use super::draw::{between, log_between, pick};
+use super::effect::at;
+use super::temperature::Temperature;
 use super::{Kind, Manner};
 use crate::units::MissionTime;
 
@@ -95,6 +97,8 @@ pub struct Flight {
     pub density_flat_kg_m3: Vec<f64>,
     /// Sensor temperature, deg C.
     pub temperature_c: Vec<f64>,
+    /// What makes it, and made it before.
+    temperature: Temperature,
     /// Day-night amplitude of the density.
     pub bulge: f64,
     /// Wind beside co-rotation that both the vehicle and its simulation know, east and north, m/s, at each point.
@@ -136,7 +140,8 @@ impl Flight {
         let rate_rad_s = rates(&body);
         let rate_change_rad_s2 = derivative(&rate_rad_s);
         let (density_flat_kg_m3, bulge) = density(rng, &times_s, &position_m, other_physics);
-        let temperature_c = temperature(rng, &times_s, &position_m);
+        let temperature = Temperature::draw(rng, &position_m[0]);
+        let temperature_c = times_s.iter().map(|t| temperature.at_c(*t)).collect();
         let wind_m_s = wind(rng, &times_s, &position_m, other_physics);
         let vehicle = vehicle(rng, other_physics);
         Self {
@@ -150,11 +155,21 @@ impl Flight {
             rate_change_rad_s2,
             density_flat_kg_m3,
             temperature_c,
+            temperature,
             bulge,
             wind_m_s,
             attitudes,
             events,
             vehicle,
+        }
+    }
+
+    /// Sensor temperature at a place of the grid, deg C; before the first as it was.
+    pub fn temperature_at(&self, place: f64) -> f64 {
+        if place < 0.0 {
+            self.temperature.at_c(self.times_s[0] + place * STEP_S)
+        } else {
+            at(&self.temperature_c, place)
         }
     }
 
@@ -368,25 +383,6 @@ fn density(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>], other_phy
         })
         .collect();
     (density, between(rng, 0.3, 0.45))
-}
-
-/// A daily and an orbital swing and a slow wander about 4 deg C.
-fn temperature(rng: &mut ChaCha12Rng, times_s: &[f64], r: &[Vector3<f64>]) -> Vec<f64> {
-    let (day_c, orbit_c) = (between(rng, 0.4, 1.3), between(rng, 0.1, 0.35));
-    let (day_phase, orbit_phase) = (between(rng, 0.0, std::f64::consts::TAU), between(rng, 0.0, std::f64::consts::TAU));
-    let wander: Vec<(f64, f64, f64)> = (0..3)
-        .map(|_| (between(rng, 0.05, 0.3), between(rng, 15e3, 2e5), between(rng, 0.0, std::f64::consts::TAU)))
-        .collect();
-    let orbit_s = std::f64::consts::TAU * (r[0].norm().powi(3) / MU_M3_S2).sqrt();
-    let mean_c = between(rng, 3.0, 5.0);
-    times_s
-        .iter()
-        .map(|t| {
-            let slow: f64 = wander.iter().map(|(c, s, phase)| c * (std::f64::consts::TAU * t / s + phase).sin()).sum();
-            let day = day_c * (std::f64::consts::TAU * t / 86_400.0 + day_phase).sin();
-            mean_c + day + orbit_c * (std::f64::consts::TAU * t / orbit_s + orbit_phase).sin() + slow
-        })
-        .collect()
 }
 
 /// A wind over local time and latitude that the simulation knows too (inertial axes), zero unless the physics is its own.

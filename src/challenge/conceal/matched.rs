@@ -104,7 +104,7 @@ impl<'a> Matched<'a> {
         let offset = || (0..3).map(|i| apparent(flight, &Vector3::ith(i, 1.0))).collect::<Vec<_>>();
         let since = |onset: f64| flight.times_s.iter().map(move |t| t - onset);
         let onsets = || (1..36).map(|j| flight.start_s + flight.length_s * f64::from(j) / 36.0);
-        let lags = [0.0, 600.0, 1200.0, 2400.0, 4800.0, 9600.0];
+        let lags = [0.0, 600.0, 1200.0, 2400.0, 4800.0, 9600.0, 19_200.0];
         match id {
             "cg_offset" => vec![Group::Columns(offset())],
             "mass_shift" => {
@@ -131,7 +131,7 @@ impl<'a> Matched<'a> {
                 .iter()
                 .map(|lag| {
                     let t = &flight.temperature_c;
-                    Group::Shape((0..t.len()).map(|k| effect::at(t, k as f64 - lag / STEP_S) - t[0]).collect())
+                    Group::Shape((0..t.len()).map(|k| flight.temperature_at(k as f64 - lag / STEP_S) - t[0]).collect())
                 })
                 .collect(),
             "time_offset" => {

@@ -13,6 +13,7 @@ mod matched;
 mod noise;
 mod record;
 mod tape;
+mod temperature;
 mod truth;
 
 use std::collections::BTreeMap;

@@ -1,6 +1,11 @@
 //! Bias follows the sensor temperature, perhaps late.
+//!
+//! What it follows before the log of the temperature begins is one of two, as likely: what the log begins with, or the cycles of the
+//! orbit and the day.
 
 use super::{Effect, Linear, Nonlinear, Shape, Theta};
+use crate::diagnose::case::HALF_WINDOW_S;
+use crate::diagnose::earlier::REACH_S;
 use crate::diagnose::measure::window_means;
 use crate::diagnose::scene::Scene;
 
@@ -33,21 +38,38 @@ pub const EFFECT: Effect = Effect {
 };
 
 /// Longest lag, s.
-const LAG_S_MAX: f64 = 28_800.0;
+const LAG_S_MAX: f64 = REACH_S;
 
-fn grid(_: &Scene) -> Vec<Theta> {
-    [0.0, 300.0, 600.0, 1200.0, 1800.0, 2700.0, 3600.0, 5400.0, 7200.0, 10_800.0, 14_400.0, 21_600.0, LAG_S_MAX]
-        .map(|lag| [lag, 0.0])
-        .to_vec()
+/// Before the log there was what it begins with, or what its cycles tell: the second number of a theta.
+const AS_IT_BEGINS: f64 = 0.0;
+const AS_ITS_CYCLES: f64 = 1.0;
+
+/// Lag up to which the log says all that is felt, s.
+fn logged(scene: &Scene) -> f64 {
+    scene.clock_s()[0] - scene.grid_s[0] - HALF_WINDOW_S
 }
 
-fn log_density(_: &Scene, _: &Theta) -> f64 {
-    -LAG_S_MAX.ln()
+fn grid(scene: &Scene) -> Vec<Theta> {
+    // The cycle of the orbit has a peak of the likelihood at every one of its periods: six to each.
+    let lags = || [0.0, 300.0, 600.0].into_iter().chain((1..=32).map(|k| 900.0 * f64::from(k)));
+    let beyond = lags().filter(|lag| *lag > logged(scene));
+    lags().map(|lag| [lag, AS_IT_BEGINS]).chain(beyond.map(|lag| [lag, AS_ITS_CYCLES])).collect()
+}
+
+fn log_density(scene: &Scene, theta: &Theta) -> f64 {
+    let ways: f64 = if theta[0] > logged(scene) { 2.0 } else { 1.0 };
+    -(ways * LAG_S_MAX).ln()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     if !(0.0..=LAG_S_MAX).contains(&theta[0]) {
         return None;
     }
-    Some(Shape::scalar(&window_means(&scene.grid_s, &scene.temperature_c, scene.clock_s(), theta[0])))
+    let (grid_s, temperature_c) = if theta[1] == AS_ITS_CYCLES {
+        let longer = &scene.temperature_and_earlier;
+        (&longer.grid_s, &longer.values)
+    } else {
+        (&scene.grid_s, &scene.temperature_c)
+    };
+    Some(Shape::scalar(&window_means(grid_s, temperature_c, scene.clock_s(), theta[0])))
 }

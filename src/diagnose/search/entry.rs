@@ -79,6 +79,12 @@ impl Entry {
         self.effect().and_then(|effect| effect.linear.get(k)).map_or_else(|| self.sizes[k], |l| l.size)
     }
 
+    /// The starting point that has half of the prior to itself.
+    pub(super) fn atom(&self) -> Option<Theta> {
+        let value = self.effect()?.nonlinear.iter().find_map(|parameter| parameter.atom)?;
+        self.points.iter().map(|(theta, _)| *theta).find(|theta| theta[0] == value)
+    }
+
     pub(super) fn effect(&self) -> Option<&'static Effect> {
         match self.family {
             Family::Listed(effect) => Some(effect),
@@ -107,6 +113,7 @@ fn log_shares(scene: &Scene, effect: &Effect, points: &[(Theta, Shape)]) -> Vec<
 fn log_shares_along(parameter: &Nonlinear, log_density: impl Fn(f64) -> f64, points: &[f64]) -> Vec<f64> {
     let mut sorted = points.to_vec();
     sorted.sort_by(f64::total_cmp);
+    sorted.dedup();
     let is_atom = |x: f64| parameter.atom == Some(x);
     let mass = |x: &f64| {
         let i = sorted.partition_point(|y| y < x);

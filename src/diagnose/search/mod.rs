@@ -6,6 +6,7 @@
 
 mod entry;
 mod imitate;
+mod peaks;
 mod refine;
 mod volume;
 mod weigh;

@@ -1,9 +1,10 @@
 //! The nonlinear parameters of a set: their best values; and where columns that are only nearly linear are taken.
 
-use super::volume::{atom, volume};
-use super::{Entry, Member, Set, point_at, whiten};
-use crate::diagnose::catalogue::Theta;
-use crate::diagnose::design::Frame;
+use super::peaks::Peak;
+use super::volume::volume;
+use super::{Entry, Member, Set, Whitened, point_at, whiten, whiten_all};
+use crate::diagnose::catalogue::{Shape, Theta};
+use crate::diagnose::design::{Chosen, Frame};
 use crate::diagnose::optimise::nelder_mead;
 use crate::diagnose::scene::Scene;
 
@@ -38,20 +39,31 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
             t
         };
         let refined = place(&nelder_mead(&start, &steps, 60, |p| -gain(&place(p))));
-        let places = [Some(theta), Some(refined), atom(&theta, &free, effect)]
-            .into_iter()
-            .flatten()
-            .map(|theta| (gain(&theta), theta));
+        let atom = entry.atom();
+        let places = [Some(theta), Some(refined), atom].into_iter().flatten().map(|theta| (gain(&theta), theta));
         let best = places.filter(|(gain, _)| gain.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((peak, theta)) = best else { continue };
-        let (log_occam, sigma) = volume(&gain, &theta, &free, effect, (effect.log_density)(scene, &theta), peak);
-        if let Some(point) = point_at(scene, frame, entry, &set.members[i], &theta) {
+        let (log_share, sigma) = volume(&gain, &theta, &free, effect, (effect.log_density)(scene, &theta), peak);
+        let mut told = Peak { theta, gain: peak, log_share, sigma };
+        if let Some(atom) = atom {
+            told = told.among(&atom, &starts(frame, entry, &chosen, scale));
+        }
+        if let Some(point) = point_at(scene, frame, entry, &set.members[i], &told.theta) {
             let m = &mut set.members[i];
-            let log_occam = log_occam - (entry.scales().len() as f64).ln();
-            (m.theta, m.log_occam, m.theta_sigma, m.point) = (theta, log_occam, sigma, point);
+            let log_occam = told.log_share - (entry.scales().len() as f64).ln();
+            (m.theta, m.log_occam, m.theta_sigma, m.point) = (told.theta, log_occam, told.sigma, point);
         }
     }
     set.weigh(frame, entries);
+}
+
+/// What the starting points of an entry explain beside a chosen set.
+fn starts(frame: &Frame, entry: &Entry, chosen: &Chosen, scale: f64) -> Vec<Peak> {
+    let points: Vec<(Theta, &Shape, &Entry)> =
+        entry.points.iter().map(|(theta, shape)| (*theta, shape, entry)).collect();
+    let start =
+        |(point, share): (&Whitened, &f64)| Peak::start(point.theta, chosen.normal(&point.columns).gain(scale), *share);
+    whiten_all(frame, &points).iter().zip(&entry.log_shares).map(start).collect()
 }
 
 /// Times the columns of a member are taken anew at most, the first ones without half of the way back, which ends a swing between

@@ -1,8 +1,7 @@
 //! The volume of the posterior of nonlinear parameters about their peak, against that of their prior.
 //!
 //! By Laplace, the evidence falling as a parabola; but along an onset, where it is jagged: one window more or less before the step
-//! changes it by that window's noise, and several instants do nearly as well as the best. There it is summed. A value with half of
-//! the prior to itself (no lag at all) counts with it.
+//! changes it by that window's noise, and several instants do nearly as well as the best. There it is summed.
 
 use nalgebra::DMatrix;
 
@@ -57,14 +56,7 @@ pub fn volume(
         let parabola = (std::f64::consts::TAU / hessian[(a, a)]).sqrt();
         log_volume += (area(gain, theta, *j, h[a], peak) / parabola).ln();
     }
-    let log_share = (log_volume + log_density).min(0.0);
-    let at_atom = atom(theta, free, effect).map(|theta| gain(&theta) - peak);
-    (at_atom.map_or(log_share, |gain| (0.5 * (gain.exp() + log_share.exp())).ln()), sigma)
-}
-
-/// The parameters with one of `free` at the value that has half of the prior to itself, if there is one.
-pub(super) fn atom(theta: &Theta, free: &[usize], effect: &Effect) -> Option<Theta> {
-    free.iter().find_map(|j| Some(with(theta, *j, effect.nonlinear[*j].atom?)))
+    ((log_volume + log_density).min(0.0), sigma)
 }
 
 /// The parameters with another value of one.
@@ -134,21 +126,5 @@ mod tests {
         let expected = laplace + 80.0 * (-1.0_f64).exp();
         let found = area(&jagged, &[3.0, 0.0], 0, 2.0, 7.0);
         assert!((found / expected).ln().abs() < 0.25, "{found} {expected}");
-    }
-
-    #[test]
-    fn a_value_with_half_of_the_prior_counts_as_far_as_the_evidence_stands_there() {
-        let effect = &crate::diagnose::catalogue::temperature_bias::EFFECT;
-        let at = |lag: f64| {
-            let gain = |t: &Theta| {
-                if t[0] < 0.0 { f64::NEG_INFINITY } else { 9.0 - 0.5 * ((t[0] - lag) / 50.0).powi(2) }
-            };
-            volume(&gain, &[lag, 0.0], &[0], effect, -28_800.0_f64.ln(), 9.0).0
-        };
-        let elsewhere = 0.5 * (std::f64::consts::TAU.sqrt() * 50.0 / 28_800.0);
-        for lag in [0.0, 75.0, 2000.0] {
-            let expected = 0.5 * (-0.5 * (lag / 50.0_f64).powi(2)).exp() + elsewhere;
-            assert!((at(lag) - expected.ln()).abs() < 0.01, "{lag}: {} {}", at(lag), expected.ln());
-        }
     }
 }
