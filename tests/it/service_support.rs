@@ -94,19 +94,11 @@ impl Running {
 
     /// Waits until so many playbacks are over and everything of them is published.
     pub async fn wait_for_playbacks(&self, playbacks: u64) -> Value {
-        let over =
-            |status: &Value| status["ingest"]["playbacks"] == playbacks && status["ingest"]["playbacks_open"] == 0;
-        self.wait_for(&format!("{playbacks} playbacks over"), over).await;
-        // The flush after the last batch.
-        let mut before = self.get("/status").await;
-        loop {
-            tokio::time::sleep(Duration::from_millis(120)).await;
-            let now = self.get("/status").await;
-            if now["live"]["head_seq"] == before["live"]["head_seq"] {
-                return now;
-            }
-            before = now;
-        }
+        let over = |status: &Value| {
+            let ingest = &status["ingest"];
+            ingest["playbacks"] == playbacks && ingest["playbacks_open"] == 0 && status["accel"]["settled"] == true
+        };
+        self.wait_for(&format!("{playbacks} playbacks over"), over).await
     }
 
     /// The product files as the service would write them.
