@@ -16,5 +16,7 @@ fn a_lag_of_hours_is_found_within_its_error_and_not_a_period_away() {
         let lag = &found.effects[0].parameters[0];
         assert_eq!(lag.name, "lag_s");
         assert!((lag.value - truth).abs() < 3.0 * lag.sigma && lag.sigma < 1500.0, "{truth}: {lag:?}");
+        let told = |note: &&String| note.starts_with("temperature_bias: ") && note.contains("from before its log");
+        assert_eq!(found.notes.iter().filter(told).count(), 1, "{:?}", found.notes);
     }
 }

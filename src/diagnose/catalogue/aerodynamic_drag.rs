@@ -16,6 +16,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual points against the velocity in every attitude and scales with the modelled drag.",
 };
 

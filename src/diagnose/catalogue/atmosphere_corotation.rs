@@ -16,6 +16,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual has the cross-track part that a turning atmosphere gives, changing sign between ascending and descending passes, with a small loss of drag along the track.",
 };
 

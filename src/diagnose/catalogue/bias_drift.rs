@@ -17,6 +17,7 @@ pub const EFFECT: Effect = Effect {
     log_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The bias of each sensor axis relaxes from the beginning of the record with one time constant, whatever the attitude does.",
 };
 

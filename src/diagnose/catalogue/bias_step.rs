@@ -17,6 +17,7 @@ pub const EFFECT: Effect = Effect {
     log_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "Each sensor axis jumps once, at one instant, and stays there whatever the attitude does.",
 };
 

@@ -22,6 +22,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual is linear in the gravity-gradient and rotation tensor: it changes with every attitude as a displaced sensor must, and a bias cannot.",
 };
 

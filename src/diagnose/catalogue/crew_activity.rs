@@ -16,6 +16,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual shifts at the logged ends of the sleep periods and nowhere else.",
 };
 

@@ -17,6 +17,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual lies along the drag, once per orbit, strongest when the vehicle passes the afternoon side: it follows the Sun and not the perigee.",
 };
 

@@ -18,6 +18,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual is the gravity gradient at the assumed sensor position: it turns with the local vertical in body axes and follows every attitude change.",
 };
 

@@ -27,6 +27,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual is linear in the geomagnetic field in body axes: it follows magnetic latitude, with the Earth turning below the orbit.",
 };
 

@@ -24,6 +24,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual begins at a logged change of mass and follows the gravity-gradient and rotation tensor from there on: the centre of gravity moved.",
 };
 

@@ -21,6 +21,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "What one axis should read leaks into the others with fixed small angles, in every attitude.",
 };
 

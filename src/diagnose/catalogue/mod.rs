@@ -86,6 +86,8 @@ pub struct Effect {
     pub signature: fn(&Scene, &Theta) -> Option<Shape>,
     /// Where its series is only nearly linear in its coefficients: the `Theta` whose columns are exact at these coefficients.
     pub exact_at: Option<fn(&[f64]) -> Theta>,
+    /// What its series at `Theta` takes for granted and no record says, to be told with it.
+    pub assumes: Option<fn(&Scene, &Theta) -> Option<String>>,
     /// Why it is this one, for a flight engineer.
     pub why: &'static str,
 }

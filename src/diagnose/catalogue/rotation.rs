@@ -18,6 +18,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual follows the square of the body rates and their change at the assumed sensor position, largest in manoeuvres.",
 };
 

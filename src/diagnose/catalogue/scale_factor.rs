@@ -16,6 +16,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "All the modelled physics of one axis is off by the same factor, gravity gradient and drag alike, and the other axes are not.",
 };
 

@@ -18,6 +18,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual points away from the Sun and switches at the edges of the shadow, without lag.",
 };
 

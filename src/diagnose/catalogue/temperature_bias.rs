@@ -34,6 +34,7 @@ pub const EFFECT: Effect = Effect {
     log_density,
     signature,
     exact_at: None,
+    assumes: Some(assumes),
     why: "The residual is proportional to the sensor temperature on every axis, swings with the daily and orbital cycle and lags as stated.",
 };
 
@@ -72,4 +73,18 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
         (&scene.grid_s, &scene.temperature_c)
     };
     Some(Shape::scalar(&window_means(grid_s, temperature_c, scene.clock_s(), theta[0])))
+}
+
+fn assumes(scene: &Scene, theta: &Theta) -> Option<String> {
+    let begins_s = scene.grid_s[0] + theta[0] + HALF_WINDOW_S;
+    let before = scene.clock_s().iter().filter(|t| **t < begins_s).count();
+    let taken_for =
+        if theta[1] == AS_ITS_CYCLES { "what its cycles of orbit and day were" } else { "what its log begins with" };
+    (before > 0).then(|| {
+        format!(
+            "a temperature felt {:.0} s late is from before its log in {before} of {} windows, and taken there for {taken_for}",
+            theta[0],
+            scene.schedule.len()
+        )
+    })
 }

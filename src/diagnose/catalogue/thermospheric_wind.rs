@@ -24,6 +24,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature: about,
     exact_at: Some(|wind_m_s| [wind_m_s[0], wind_m_s[1]]),
+    assumes: None,
     why: "The residual is what a steady wind along and across the track does to the drag, of a speed that the thermosphere has.",
 };
 

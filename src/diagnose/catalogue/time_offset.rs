@@ -23,6 +23,7 @@ pub const EFFECT: Effect = Effect {
     log_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The recording shows the modelled signal late or early: the difference follows its time derivative, manoeuvres above all.",
 };
 

@@ -20,6 +20,7 @@ pub const EFFECT: Effect = Effect {
     log_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "A push fixed in the body begins at an instant no log names and dies away exponentially, whatever the attitude does.",
 };
 

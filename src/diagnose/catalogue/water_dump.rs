@@ -16,6 +16,7 @@ pub const EFFECT: Effect = Effect {
     log_density: no_density,
     signature,
     exact_at: None,
+    assumes: None,
     why: "The residual is a push fixed in the body that begins and ends with the logged water dumps.",
 };
 

@@ -28,7 +28,7 @@ use super::locate;
 use super::model::{self, MemberFit};
 use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
-use super::search::{Entry, Family, Set, Weighed};
+use super::search::{Entry, Family, Member, Set, Weighed};
 use super::solve::{Library, Solution};
 
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
@@ -159,7 +159,10 @@ fn of_the_mismatch(
                 (None, None) => hypothesis(library, &best, &listed, open_wins),
             });
         }
-        _ => name(&mut answer, scene, library, &best, &listed),
+        _ => {
+            notes.extend(of_assumptions(scene, library, &best.set));
+            name(&mut answer, scene, library, &best, &listed);
+        }
     }
     answer.notes = notes;
     (answer, signal, ladder(library, solution))
@@ -198,6 +201,15 @@ fn of_colour(lessened: f64) -> Option<String> {
              evidence is no proof"
         )
     })
+}
+
+/// What the series of a set take for granted.
+fn of_assumptions(scene: &Scene, library: &Library, set: &Set) -> Vec<String> {
+    let assumed = |(i, m): (usize, &Member)| {
+        let effect = effect_of(&library.entries, set, i)?;
+        Some(format!("{}: {}", effect.id, (effect.assumes?)(scene, &m.theta)?))
+    };
+    set.members.iter().enumerate().filter_map(assumed).collect()
 }
 
 /// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.
