@@ -240,7 +240,7 @@ impl<'a> Trial<'a> {
     /// The set's series over the whole record with amplitudes fitted to a part of it.
     fn predict(&self, train: &OnPart) -> Axes {
         let mut sum: Axes = std::array::from_fn(|_| vec![0.0; self.scene.schedule.len()]);
-        let mean = train.normal.posterior_mean();
+        let mean = train.normal.posterior().0;
         let mut mean = mean.iter();
         for (raw, size) in &self.series {
             add(&mut sum, raw, size.map_or(1.0, |size| size * mean.next().unwrap_or(&0.0)));

@@ -3,6 +3,7 @@
 mod bursts;
 mod dump;
 mod lag;
+mod limits;
 mod separating;
 mod smooth;
 mod trial;

@@ -76,11 +76,13 @@ impl Normal {
         Some((0.5 * sizes.dot(&self.y), sizes))
     }
 
-    /// Posterior mean of the sizes in units of their priors.
-    pub fn posterior_mean(&self) -> DVector<f64> {
+    /// Posterior mean and covariance of the sizes in units of their priors.
+    pub fn posterior(&self) -> (DVector<f64>, DMatrix<f64>) {
         let n = self.y.len();
-        Cholesky::new(&self.a + DMatrix::identity(n, n))
-            .map_or_else(|| DVector::zeros(n), |c| c.solve(&(&self.y + &self.mean)))
+        match Cholesky::new(&self.a + DMatrix::identity(n, n)) {
+            Some(c) => (c.solve(&(&self.y + &self.mean)), c.inverse()),
+            None => (DVector::zeros(n), DMatrix::identity(n, n)),
+        }
     }
 
     /// Whitened energy that a prediction from this part of a record is expected to miss of the series fitted to all of it, in the

@@ -43,7 +43,7 @@ fn a_prior_about_a_mean_is_one_about_nothing_of_what_the_mean_leaves() {
     let wider = full_column(&all, &term, 0.3).about(10.0 / 3.0);
     let other_way = Chosen::new(&all, vec![&beside], &[]).normal(&[wider]).gain(1.0);
     assert!((grown.gain(3.0) - other_way).abs() < 1e-6 * other_way.abs());
-    let size = 0.1 * grown.posterior_mean()[0];
+    let size = 0.1 * grown.posterior().0[0];
     assert!(0.85 < size && size < 1.0, "between what the data say and what the prior does: {size}");
 }
 

@@ -129,7 +129,7 @@ fn of_the_mismatch(
         if verdict == Verdict::Consistent && failure.is_none() {
             answer.alternatives = nearest(library, &solution.null, &listed);
         }
-        answer.upper_limits = upper_limits(scene, library, &null_frame, &Set::default());
+        answer.upper_limits = upper_limits(library, &null_frame, &Set::default());
         answer.fit =
             Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), tried, &mut answer.notes).0);
         return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder(library, solution));
@@ -148,7 +148,7 @@ fn of_the_mismatch(
         per_orbit_lines: locate::lines(scene, &best.frame),
         ..locate::of_signal(scene, &signal, why_here(&best))
     };
-    answer.upper_limits = upper_limits(scene, library, &best.frame, &best.set);
+    answer.upper_limits = upper_limits(library, &best.frame, &best.set);
     match verdict {
         Verdict::Unexplained => {
             answer.hypothesis = Some(match (failure, remains.filter(|_| !open_wins && !refused)) {
