@@ -22,6 +22,10 @@ const OWN_NOISE_QUIET: [usize; 2] = [3, 2];
 const QUIET_SHARE: f64 = 0.04;
 const QUIET_TAU_S: f64 = 3000.0;
 
+/// Log posterior by which a null's noise must be improved upon for the search to begin again from there, and searches at most.
+const MISSED: f64 = 3.0;
+const SEARCHES_MAX: usize = 4;
+
 /// What a search needs beside the scene, made once a case.
 pub struct Library {
     /// Listed entries, then open ones.
@@ -127,6 +131,24 @@ pub fn solve(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3]) -> So
 
 /// As [`solve`], and `None` as soon as `stop` says so: it is asked every second or so of work.
 pub fn solve_unless(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3], stop: Stop) -> Option<Solution> {
+    let mut noise_null = noise_null;
+    for _ in 1..SEARCHES_MAX {
+        let solution = solve_from(scene, library, noise_null, stop)?;
+        // Evidence is against the likeliest noise: where the fit of the null missed it, the noise of the best hypothesis leads there.
+        let best = solution.best();
+        if best.set.members.is_empty() {
+            return Some(solution);
+        }
+        let again = search::weigh_with_own_noise(scene, &library.entries, &Set::default(), &best.noise, 1, 80);
+        if again.log_posterior < solution.null.log_posterior + MISSED {
+            return Some(solution);
+        }
+        noise_null = again.noise;
+    }
+    solve_from(scene, library, noise_null, stop)
+}
+
+fn solve_from(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3], stop: Stop) -> Option<Solution> {
     let entries = &library.entries;
     let null = search::weigh_with_own_noise(scene, entries, &Set::default(), &noise_null, 0, 0);
     let (found, more) = shared_work::both(
