@@ -41,7 +41,7 @@ pub struct Args {
     #[arg(long, value_delimiter = ',')]
     without: Vec<String>,
     /// False-alarm probability at or below which something is claimed.
-    #[arg(long, default_value_t = 0.002)]
+    #[arg(long, default_value_t = 0.002, value_parser = probability)]
     claim_probability: f64,
 }
 
@@ -132,16 +132,51 @@ fn analyse(args: &Args) -> Result<Analysis, CaseError> {
     Ok(prepared.conclude(reached))
 }
 
+fn probability(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(p) if p > 0.0 && p < 1.0 => Ok(p),
+        _ => Err("a probability between 0 and 1 is expected".into()),
+    }
+}
+
 /// Reads a case directory.
 ///
 /// # Errors
 /// [`CaseError`] with one sentence that names the file and the value.
 pub fn read_case(directory: &Path, set: &[String]) -> Result<Case, CaseError> {
-    let file = |name: &str| std::fs::read(directory.join(name)).ok();
-    let toml = file("case.toml")
-        .and_then(|octets| String::from_utf8(octets).ok())
-        .ok_or_else(|| CaseError::MissingFile { file: directory.join("case.toml").display().to_string() })?;
-    recorder::case(Header::parse(&toml, set)?, file)
+    let toml = octets(directory, "case.toml").and_then(|octets| {
+        let missing = || CaseError::MissingFile { file: directory.join("case.toml").display().to_string() };
+        text("case.toml", octets.ok_or_else(missing)?)
+    })?;
+    let header = Header::parse(&toml, set)?;
+    // What is there and cannot be read is not missing.
+    for name in [&header.files.simulation, &header.files.ancillary, &header.files.events, &header.files.recording] {
+        if let Some(octets) = octets(directory, name)?
+            && (*name != header.files.recording || header.kind == "acceleration_csv")
+        {
+            text(name, octets)?;
+        }
+    }
+    recorder::case(header, |name| octets(directory, name).ok().flatten())
+}
+
+/// The octets of a file of a case, `None` where there is none.
+fn octets(directory: &Path, name: &str) -> Result<Option<Vec<u8>>, CaseError> {
+    let unreadable = |reason: String| CaseError::Unreadable { file: name.into(), reason };
+    let path = directory.join(name);
+    match std::fs::metadata(&path) {
+        Err(_) => Ok(None),
+        Ok(_) if name.is_empty() => Ok(None),
+        Ok(metadata) if !metadata.is_file() => Err(unreadable("it is not a regular file".into())),
+        Ok(_) => std::fs::read(&path).map(Some).map_err(|error| unreadable(error.to_string())),
+    }
+}
+
+fn text(name: &str, octets: Vec<u8>) -> Result<String, CaseError> {
+    String::from_utf8(octets).map_err(|error| CaseError::Unreadable {
+        file: name.into(),
+        reason: format!("octet {} is no UTF-8 text", error.utf8_error().valid_up_to() + 1),
+    })
 }
 
 fn print_table(diagnosis: &Diagnosis) {

@@ -22,6 +22,17 @@ pub enum CaseError {
         /// Its name.
         file: String,
     },
+    /// A file is not named.
+    #[error("case.toml: recording.file, simulation.file and ancillary.file must each name a file")]
+    Unnamed,
+    /// A file that is there and cannot be read.
+    #[error("{file}: it is there and cannot be read: {reason}")]
+    Unreadable {
+        /// Its name.
+        file: String,
+        /// Why.
+        reason: String,
+    },
     /// A column is absent.
     #[error("{file}: no column `{column}`; the header has: {found}")]
     MissingColumn {
@@ -82,6 +93,51 @@ pub enum CaseError {
         /// Highest credible.
         high: f64,
     },
+    /// A value that nothing can have.
+    #[error("{file}, line {line}: `{column}` is {found:.3e}, and {unit} between {low:e} and {high:e} is expected")]
+    Beyond {
+        /// File.
+        file: String,
+        /// Line, the header being 1.
+        line: usize,
+        /// Column.
+        column: String,
+        /// The value.
+        found: f64,
+        /// Unit expected.
+        unit: &'static str,
+        /// Lowest credible.
+        low: f64,
+        /// Highest credible.
+        high: f64,
+    },
+    /// An axis that never changes.
+    #[error("{file}: `{column}` is {value} in all {rows} rows: a sensor that measures has noise")]
+    Frozen {
+        /// File.
+        file: String,
+        /// Column.
+        column: String,
+        /// Its one value.
+        value: f64,
+        /// Rows.
+        rows: usize,
+    },
+    /// A grid too coarse, or with too long a hole, for what is left of the recording.
+    #[error(
+        "{file}: its grid is too coarse: {common} windows of the recording are between points less than {step_s} s apart \
+         that a line can join, and at least {needed} are needed"
+    )]
+    TooCoarse {
+        /// File.
+        file: String,
+        /// Longest step across which anything is compared, s.
+        step_s: f64,
+        /// Windows left.
+        common: usize,
+        /// Windows needed.
+        needed: usize,
+    },
     /// Too little to work with.
     #[error("{file}: {found} rows, and at least {needed} are needed")]
     TooFew {
@@ -127,14 +183,18 @@ impl CaseError {
     pub fn file(&self) -> Option<&String> {
         match self {
             Self::MissingFile { file }
+            | Self::Unreadable { file, .. }
             | Self::MissingColumn { file, .. }
             | Self::NotANumber { file, .. }
             | Self::Csv { file, .. }
             | Self::TimeOrder { file, .. }
             | Self::Unit { file, .. }
+            | Self::Beyond { file, .. }
+            | Self::Frozen { file, .. }
+            | Self::TooCoarse { file, .. }
             | Self::TooFew { file, .. }
             | Self::NoOverlap { file, .. } => Some(file),
-            Self::Toml(_) | Self::Key { .. } | Self::Kind(_) | Self::Numeric(_) => None,
+            Self::Unnamed | Self::Toml(_) | Self::Key { .. } | Self::Kind(_) | Self::Numeric(_) => None,
         }
     }
 }

@@ -394,7 +394,16 @@ fn to_come(scene: &Scene, action: Action, hours: f64) -> Option<(Case, Surroundi
             error.resize(error.len() + windows, now);
         }
     }
-    Some((Case { expected: Arc::new(expected), recording, windows_too_rough: 0 }, surroundings))
+    Some((
+        Case {
+            expected: Arc::new(expected),
+            recording,
+            windows_in_holes: 0,
+            windows_too_rough: 0,
+            windows_of_spikes: 0,
+        },
+        surroundings,
+    ))
 }
 
 /// Orbit, attitude, environment and simulation after grid point `last`. Density and temperature are those of the same place on

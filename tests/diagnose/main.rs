@@ -4,6 +4,7 @@ mod bursts;
 mod dump;
 mod lag;
 mod limits;
+mod odd;
 mod separating;
 mod smooth;
 mod trial;

@@ -3,6 +3,8 @@
 use super::{Ancillary, Recording, Simulation, WINDOWS_MIN};
 use crate::diagnose::error::CaseError;
 
+/// Nothing on a vehicle in orbit is accelerated by more, ng.
+const A_MAX_NG: f64 = 1e9;
 /// Columns of accelerations.
 const ACCELERATION: [&str; 3] = ["ax_ng", "ay_ng", "az_ng"];
 
@@ -12,7 +14,9 @@ pub fn recording(file: &str, recording: &Recording) -> Result<(), CaseError> {
         return Err(CaseError::TooFew { file: file.into(), found: recording.clock_s.len(), needed: WINDOWS_MIN });
     }
     for k in 0..3 {
+        changes(file, ACCELERATION[k], &recording.a_ng[k])?;
         typical(file, ACCELERATION[k], &recording.a_ng[k], "ng", 1e-2, 1e7)?;
+        each(file, ACCELERATION[k], &recording.a_ng[k], "ng", [-A_MAX_NG, A_MAX_NG])?;
         typical(file, ["dev_x_ng", "dev_y_ng", "dev_z_ng"][k], &recording.dev_ng[k], "ng", 1e-3, 1e7)?;
     }
     Ok(())
@@ -20,7 +24,10 @@ pub fn recording(file: &str, recording: &Recording) -> Result<(), CaseError> {
 
 /// A simulation: in nano-g.
 pub fn simulation(file: &str, simulation: &Simulation) -> Result<(), CaseError> {
-    (0..3).try_for_each(|k| typical(file, ACCELERATION[k], &simulation.a_ng[k], "ng", 1e-6, 1e7))
+    (0..3).try_for_each(|k| {
+        typical(file, ACCELERATION[k], &simulation.a_ng[k], "ng", 0.0, 1e7)?;
+        each(file, ACCELERATION[k], &simulation.a_ng[k], "ng", [-A_MAX_NG, A_MAX_NG])
+    })
 }
 
 /// Orbit, attitude and environment: SI, degrees Celsius, unit quaternions.
@@ -32,14 +39,47 @@ pub fn ancillary(file: &str, ancillary: &Ancillary) -> Result<(), CaseError> {
     typical(file, "density_kg_m3", &ancillary.density_kg_m3, "kg/m3", 0.0, 1e-6)?;
     typical(file, "temperature_c", &ancillary.temperature_c, "C", 0.0, 500.0)?;
     let q: Vec<f64> = ancillary.q.iter().map(|q| q.iter().map(|c| c * c).sum::<f64>().sqrt()).collect();
-    typical(file, "qw, qx, qy, qz (norm)", &q, "1, the norm", 0.99, 1.01)
+    typical(file, "qw, qx, qy, qz (norm)", &q, "a norm", 0.99, 1.01)?;
+    each(file, "qw, qx, qy, qz (norm)", &q, "a norm", [0.9, 1.1])?;
+    each(file, "rx_m, ry_m, rz_m (norm)", &norm(&ancillary.r_m), "m", [6.3e6, 1e8])?;
+    each(file, "vx_m_s, vy_m_s, vz_m_s (norm)", &norm(&ancillary.v_m_s), "m/s", [1e2, 2e4])?;
+    each(file, "wx_rad_s, wy_rad_s, wz_rad_s (norm)", &norm(&ancillary.w_rad_s), "rad/s", [0.0, 10.0])?;
+    each(file, "density_kg_m3", &ancillary.density_kg_m3, "kg/m3", [0.0, 1e-6])?;
+    each(file, "temperature_c", &ancillary.temperature_c, "C", [-273.15, 2000.0])
+}
+
+/// Every value within what there is.
+fn each(file: &str, column: &str, values: &[f64], unit: &'static str, [low, high]: [f64; 2]) -> Result<(), CaseError> {
+    match values.iter().position(|x| !(low..=high).contains(x)) {
+        Some(i) => Err(CaseError::Beyond {
+            file: file.into(),
+            line: i + 2,
+            column: column.into(),
+            found: values[i],
+            unit,
+            low,
+            high,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Not one value throughout.
+fn changes(file: &str, column: &str, values: &[f64]) -> Result<(), CaseError> {
+    if values.iter().all(|x| *x == values[0]) {
+        let (value, rows) = (values[0], values.len());
+        return Err(CaseError::Frozen { file: file.into(), column: column.into(), value, rows });
+    }
+    Ok(())
 }
 
 fn typical(file: &str, column: &str, values: &[f64], unit: &'static str, low: f64, high: f64) -> Result<(), CaseError> {
     let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     let found = sizes[sizes.len() / 2];
-    if found < low || found > high {
+    // A coarse count is mostly zero and not too small for that.
+    let many = sizes[sizes.len() * 9 / 10];
+    if many < low || found > high {
         return Err(CaseError::Unit { file: file.into(), column: column.into(), found, unit, low, high });
     }
     Ok(())

@@ -56,6 +56,51 @@ pub struct Vehicle {
     pub srp_coefficient: f64,
 }
 
+/// Farthest that a sensor may be from the centre of gravity, m.
+const OFFSET_MAX_M: f64 = 100.0;
+
+impl Vehicle {
+    /// From `[vehicle]`; where a recording is compared with a simulation of it, all but the coefficient of radiation must be there.
+    fn of(table: &toml::Table, needed: bool) -> Result<Self, CaseError> {
+        let number = |key: &str, usual: f64| {
+            if needed && lookup(table, key).is_none() {
+                return Err(wrong(key, "a finite number", None));
+            }
+            number_or(table, key, usual)
+        };
+        let triple = |key: &str, usual: [f64; 3]| {
+            if needed && lookup(table, key).is_none() {
+                return Err(wrong(key, "three finite numbers", None));
+            }
+            triple_or(table, key, usual)
+        };
+        let vehicle = Self {
+            mass_kg: number("vehicle.mass_kg", 104_000.0)?,
+            drag_coefficient: number("vehicle.drag_coefficient", 2.2)?,
+            area_m2: triple("vehicle.area_m2", [64.1, 255.0, 367.0])?,
+            sensor_offset_m: triple("vehicle.sensor_offset_m", [0.0; 3])?,
+            srp_coefficient: number_or(table, "vehicle.srp_coefficient", 1.3)?,
+        };
+        let refused = |key: &str, expected: &'static str| Err(wrong(key, expected, lookup(table, key)));
+        if vehicle.mass_kg <= 0.0 {
+            return refused("vehicle.mass_kg", "positive");
+        }
+        if !(0.1..=10.0).contains(&vehicle.drag_coefficient) {
+            return refused("vehicle.drag_coefficient", "between 0.1 and 10");
+        }
+        if vehicle.area_m2.iter().any(|area| *area <= 0.0) {
+            return refused("vehicle.area_m2", "three positive areas");
+        }
+        if vehicle.sensor_offset_m.iter().any(|offset| offset.abs() > OFFSET_MAX_M) {
+            return refused("vehicle.sensor_offset_m", "within 100 m of the centre of gravity");
+        }
+        if vehicle.srp_coefficient < 0.0 {
+            return refused("vehicle.srp_coefficient", "not negative");
+        }
+        Ok(vehicle)
+    }
+}
+
 impl Header {
     /// Parse `case.toml`; `set` are `key=value` overrides of dotted keys.
     pub fn parse(text: &str, set: &[String]) -> Result<Self, CaseError> {
@@ -65,13 +110,7 @@ impl Header {
             override_key(&mut table, item)?;
         }
         let kind = string(&table, "recording.kind")?;
-        let vehicle = Vehicle {
-            mass_kg: number_or(&table, "vehicle.mass_kg", 104_000.0)?,
-            drag_coefficient: number_or(&table, "vehicle.drag_coefficient", 2.2)?,
-            area_m2: triple_or(&table, "vehicle.area_m2", [64.1, 255.0, 367.0])?,
-            sensor_offset_m: triple_or(&table, "vehicle.sensor_offset_m", [0.0; 3])?,
-            srp_coefficient: number_or(&table, "vehicle.srp_coefficient", 1.3)?,
-        };
+        let vehicle = Vehicle::of(&table, matches!(kind.as_str(), "acceleration_csv" | "recorder_dump"))?;
         let epoch = string(&table, "case.epoch_utc")
             .or_else(|e| if kind == "acceleration_csv" { Err(e) } else { Ok("1970-01-01T00:00:00Z".into()) })?;
         let epoch_utc = epoch.parse().map_err(|_| CaseError::Key {
@@ -79,13 +118,6 @@ impl Header {
             expected: "a UTC time such as 1994-07-08T12:53:01Z",
             found: epoch,
         })?;
-        if vehicle.mass_kg <= 0.0 {
-            return Err(CaseError::Key {
-                key: "vehicle.mass_kg".into(),
-                expected: "positive",
-                found: vehicle.mass_kg.to_string(),
-            });
-        }
         Ok(Self {
             id: string(&table, "case.id")?,
             epoch_utc,

@@ -3,11 +3,13 @@
 mod check;
 mod header;
 mod read;
+mod spikes;
 
 use std::ops::Deref;
 use std::sync::Arc;
 
 pub use header::{Files, Header, Vehicle};
+pub use spikes::SPIKE;
 
 use super::error::CaseError;
 use crate::pipeline::calibration::AnomalyKind;
@@ -119,8 +121,12 @@ pub struct Case {
     pub expected: Arc<Expectation>,
     /// The recording.
     pub recording: Recording,
+    /// Windows left out because simulation or ancillary data have a hole there.
+    pub windows_in_holes: usize,
     /// Windows left out because the simulation's grid is too coarse for its own signal there.
     pub windows_too_rough: usize,
+    /// Windows left out because they stand alone, far out of what is before and after them.
+    pub windows_of_spikes: usize,
 }
 
 impl Deref for Case {
@@ -235,13 +241,29 @@ impl Case {
                 });
             }
         }
+        let coarse = |file: &str, kept: &Recording| {
+            let common = kept.clock_s.len();
+            let coarse = CaseError::TooCoarse { file: file.into(), step_s: STEP_MAX_S, common, needed: WINDOWS_MIN };
+            if common < WINDOWS_MIN { Err(coarse) } else { Ok(()) }
+        };
         let before = kept.clock_s.len();
-        let smooth = smooth_enough(&kept, &expected.simulation);
-        if smooth.clock_s.len() >= WINDOWS_MIN {
-            kept = smooth;
+        for (file, grid) in
+            [(&files.simulation, &expected.simulation.clock_s), (&files.ancillary, &expected.ancillary.clock_s)]
+        {
+            kept = outside_holes(&kept, grid);
+            coarse(file, &kept)?;
         }
-        let windows_too_rough = before - kept.clock_s.len();
-        Ok(Self { expected, recording: kept, windows_too_rough })
+        let windows_in_holes = before - kept.clock_s.len();
+        kept = smooth_enough(&kept, &expected.simulation);
+        coarse(&files.simulation, &kept)?;
+        let windows_too_rough = before - windows_in_holes - kept.clock_s.len();
+        let before = kept.clock_s.len();
+        let alike = spikes::without(&kept);
+        if alike.clock_s.len() >= WINDOWS_MIN {
+            kept = alike;
+        }
+        let windows_of_spikes = before - kept.clock_s.len();
+        Ok(Self { expected, recording: kept, windows_in_holes, windows_too_rough, windows_of_spikes })
     }
 }
 
@@ -265,6 +287,21 @@ fn take(recording: &Recording, keep: &[usize]) -> Recording {
         bias_errors_ng: recording.bias_errors_ng.each_ref().map(|axis| axis.iter().map(pick).collect()),
         faults: recording.faults.clone(),
     }
+}
+
+/// Longest step of a grid across which anything is compared, s: over longer ones gravity gradient and attitude bend too much for
+/// a straight line.
+const STEP_MAX_S: f64 = 150.0;
+
+/// The windows no part of which is in a step of the grid that is longer than [`STEP_MAX_S`].
+fn outside_holes(recording: &Recording, grid: &[f64]) -> Recording {
+    let holes: Vec<&[f64]> = grid.windows(2).filter(|step| step[1] - step[0] > STEP_MAX_S).collect();
+    let touches = |t: f64| {
+        let next = holes.partition_point(|hole| hole[1] <= t - HALF_WINDOW_S);
+        holes.get(next).is_some_and(|hole| hole[0] < t + HALF_WINDOW_S)
+    };
+    let keep: Vec<usize> = (0..recording.clock_s.len()).filter(|i| !touches(recording.clock_s[*i])).collect();
+    take(recording, &keep)
 }
 
 /// Share of the noise by which a straight line between grid points may miss the simulated signal.

@@ -5,6 +5,9 @@ use crate::diagnose::error::CaseError;
 
 /// The text of a file the case names.
 pub fn given<'a>(file: &str, text: &'a Option<String>) -> Result<&'a str, CaseError> {
+    if file.is_empty() {
+        return Err(CaseError::Unnamed);
+    }
     text.as_deref().ok_or_else(|| CaseError::MissingFile { file: file.to_string() })
 }
 

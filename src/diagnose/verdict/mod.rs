@@ -22,6 +22,7 @@ use self::stands::tried;
 use self::unnamed::{hypothesis, of_failure, of_remains};
 use super::answer::{Diagnosis, Located, Verdict};
 use super::bursts::OUT;
+use super::case::SPIKE;
 use super::catalogue::Effect;
 use super::design::Frame;
 use super::locate;
@@ -181,9 +182,19 @@ fn ladder(library: &Library, solution: &Solution) -> Vec<(String, f64)> {
 fn of_windows(scene: &Scene) -> Vec<String> {
     let rough = scene.case.windows_too_rough;
     let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
+    let in_holes = scene.case.windows_in_holes;
     let mut notes = Vec::new();
+    if in_holes > 0 {
+        notes.push(format!("{in_holes} windows are left out: simulation or ancillary data have a hole there"));
+    }
     if rough > 0 {
         notes.push(format!("{rough} windows are left out: the simulation changes too fast there for its own grid"));
+    }
+    let of_spikes = scene.case.windows_of_spikes;
+    if of_spikes > 0 {
+        notes.push(format!(
+            "{of_spikes} windows are left out: they stand alone, more than {SPIKE} standard deviations from those before and after"
+        ));
     }
     if bursts > 0 {
         notes.push(format!(

@@ -1,0 +1,104 @@
+//! Odd files: what is no measurement is left out or refused with its place, and hides nothing that is there.
+
+use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
+use oare_ground::challenge::engine;
+use oare_ground::challenge::run::Material;
+use oare_ground::diagnose::case::Case;
+use oare_ground::diagnose::{Settings, diagnose};
+
+type Files = Vec<(String, Vec<u8>)>;
+
+/// A concealed case of strong drag.
+fn files() -> Files {
+    let order = Order { kind: Kind::One, seed: 1_191_000, only: Some("aerodynamic_drag"), manner: Manner::default() };
+    draw_order(&order).files
+}
+
+/// The same with the lines of one file changed.
+fn with_lines(file: &str, change: impl Fn(&mut Vec<String>)) -> Files {
+    let mut files = files();
+    let (_, octets) = files.iter_mut().find(|(name, _)| name == file).unwrap();
+    let mut lines: Vec<String> = String::from_utf8_lossy(octets).lines().map(str::to_string).collect();
+    change(&mut lines);
+    *octets = (lines.join("\n") + "\n").into_bytes();
+    files
+}
+
+/// The same with one cell changed, on a line or on all of them.
+fn with_cell(file: &str, line: Option<usize>, column: &str, value: &str) -> Files {
+    with_lines(file, |lines| {
+        let place = lines[0].split(',').position(|name| name == column).unwrap();
+        let all = 1..lines.len();
+        for i in line.map_or(all, |line| line..line + 1) {
+            let mut cells: Vec<&str> = lines[i].split(',').collect();
+            cells[place] = value;
+            lines[i] = cells.join(",");
+        }
+    })
+}
+
+fn read(files: &Files) -> Result<Case, String> {
+    engine::read(&Material::Files(files))
+}
+
+/// Whether drag is named, its fraction, and the notes.
+fn drag(files: &Files) -> (f64, f64, Vec<String>) {
+    let found = diagnose(&read(files).unwrap(), &Settings::default()).unwrap();
+    assert_eq!(super::ids(&found), ["aerodynamic_drag"], "{found:?}");
+    let fraction = &found.effects[0].parameters[0];
+    (fraction.value, fraction.sigma, found.notes)
+}
+
+#[test]
+fn a_single_wild_value_hides_nothing() {
+    let (value, sigma, notes) = drag(&files());
+    assert!(!notes.iter().any(|note| note.contains("stand alone")), "{notes:?}");
+    for axis in ["ax_ng", "ay_ng", "az_ng"] {
+        let (beside, its_sigma, notes) = drag(&with_cell("recording.csv", Some(1500), axis, "-1e6"));
+        assert!((beside - value).abs() < 0.3 * sigma && its_sigma < 1.1 * sigma, "{axis}: {beside} {its_sigma}");
+        assert!(notes.iter().any(|note| note.starts_with("1 windows") && note.contains("stand alone")), "{notes:?}");
+    }
+}
+
+#[test]
+fn where_simulation_or_ancillary_data_have_a_hole_nothing_is_compared() {
+    let (value, sigma, _) = drag(&files());
+    for file in ["simulation.csv", "ancillary.csv"] {
+        let (beside, its_sigma, notes) = drag(&with_lines(file, |lines| {
+            let third = lines.len() / 3;
+            lines.drain(third..third + third / 2);
+        }));
+        assert!((beside - value).abs() < 2.0 * sigma && its_sigma < 1.6 * sigma, "{file}: {beside} {its_sigma}");
+        assert!(notes.iter().any(|note| note.contains("have a hole there")), "{notes:?}");
+    }
+}
+
+#[test]
+fn what_nothing_can_be_is_refused_with_its_place() {
+    for (files, sentence) in [
+        (with_cell("recording.csv", None, "az_ng", "100"), "recording.csv: `az_ng` is 100 in all "),
+        (with_cell("recording.csv", Some(7), "ay_ng", "1e300"), "recording.csv, line 8: `ay_ng` is 1.000e300, and ng"),
+        (with_cell("simulation.csv", Some(9), "ax_ng", "-1e300"), "simulation.csv, line 10: `ax_ng` is -1.000e300"),
+        (with_cell("ancillary.csv", Some(4), "density_kg_m3", "1e-5"), "ancillary.csv, line 5: `density_kg_m3`"),
+        (with_cell("ancillary.csv", Some(4), "density_kg_m3", "-1e-12"), "ancillary.csv, line 5: `density_kg_m3`"),
+        (with_cell("ancillary.csv", Some(4), "wz_rad_s", "1e3"), "ancillary.csv, line 5: `wx_rad_s, wy_rad_s"),
+        (with_cell("ancillary.csv", Some(4), "qw", "5"), "ancillary.csv, line 5: `qw, qx, qy, qz (norm)`"),
+        (
+            with_lines("simulation.csv", |lines| {
+                let mut line = 0;
+                lines.retain(|_| {
+                    line += 1;
+                    line % 30 == 1
+                });
+            }),
+            "simulation.csv: its grid is too coarse: 0 windows",
+        ),
+        (
+            with_lines("case.toml", |lines| lines.retain(|line| !line.starts_with("sensor_offset_m"))),
+            "case.toml: `vehicle.sensor_offset_m` must be three finite numbers, found nothing",
+        ),
+    ] {
+        let said = read(&files).unwrap_err();
+        assert!(said.contains(sentence), "{said}");
+    }
+}
