@@ -6,6 +6,7 @@ use crate::math::shared_work;
 use crate::physics::{Mat3, Vec3};
 
 use super::answer::{Covariate, Interval, Located, OrbitLine};
+use super::case::HALF_WINDOW_S;
 use super::design::{Chosen, Frame};
 use super::scene::{Axes, Scene};
 
@@ -13,9 +14,17 @@ use super::scene::{Axes, Scene};
 const AXIS_SHARE: f64 = 0.05;
 /// Intervals named at most.
 const INTERVALS_MAX: usize = 12;
+/// Log posterior odds of a covariate from which on it is told: the prior odds of all of them are four tenths together, so that noise
+/// has one above this in at most one record in twenty (Markov's inequality).
+pub const TOLD: f64 = 2.1;
+/// An interval that begins this near to an onset begins with it, s.
+const NEAR_S: f64 = 600.0;
 
-/// Axes, frame and times of a signal the best hypothesis puts into the residual.
-pub fn of_signal(scene: &Scene, signal: &Axes, why: &str) -> Located {
+/// Size that a line has beforehand, ng.
+const LINE_NG: f64 = 30.0;
+
+/// Axes, frame and times of a signal the best hypothesis puts into the residual, which has these onsets.
+pub fn of_signal(scene: &Scene, signal: &Axes, onsets_s: &[f64]) -> Located {
     let clock = scene.clock_s();
     let n = clock.len();
     let mean: [f64; 3] = std::array::from_fn(|k| signal[k].iter().sum::<f64>() / n as f64);
@@ -33,7 +42,7 @@ pub fn of_signal(scene: &Scene, signal: &Axes, why: &str) -> Located {
         axes,
         frame,
         direction,
-        intervals: intervals(clock, &size, why),
+        intervals: intervals(clock, &size, onsets_s),
         covariates: Vec::new(),
         per_orbit_lines: Vec::new(),
     }
@@ -84,7 +93,11 @@ fn sun_frame(scene: &Scene, g: usize) -> Mat3 {
 }
 
 /// Spans in which the signal is more than a quarter of its largest, nearby ones joined.
-fn intervals(clock: &[f64], size: &[f64], why: &str) -> Vec<Interval> {
+fn intervals(clock: &[f64], size: &[f64], onsets_s: &[f64]) -> Vec<Interval> {
+    let why = |start_s: f64| {
+        let is_onset = onsets_s.iter().any(|onset_s| (onset_s - start_s).abs() < NEAR_S);
+        if is_onset { "onset" } else { "largest part of the mismatch" }.to_string()
+    };
     let largest = size.iter().copied().fold(0.0, f64::max);
     if largest <= 0.0 {
         return Vec::new();
@@ -98,8 +111,8 @@ fn intervals(clock: &[f64], size: &[f64], why: &str) -> Vec<Interval> {
                 continue;
             }
             match out.last_mut() {
-                Some(last) if t - last.end_s < join_s => last.end_s = *t,
-                _ => out.push(Interval { start_s: *t, end_s: *t, why: why.to_string() }),
+                Some(last) if t - last.end_s < join_s => last.end_s = *t + HALF_WINDOW_S,
+                _ => out.push(Interval { start_s: t - HALF_WINDOW_S, end_s: t + HALF_WINDOW_S, why: why(*t) }),
             }
         }
         if out.len() <= INTERVALS_MAX || join_s > span {
@@ -109,7 +122,7 @@ fn intervals(clock: &[f64], size: &[f64], why: &str) -> Vec<Interval> {
     }
 }
 
-/// Covariates by the evidence of following them, best first, those above nothing.
+/// Covariates by the evidence of following them, best first, those above what noise has.
 pub fn covariates(scores: impl Iterator<Item = (String, f64)>) -> Vec<Covariate> {
     let mut best: Vec<Covariate> = Vec::new();
     for (name, score) in scores {
@@ -118,10 +131,34 @@ pub fn covariates(scores: impl Iterator<Item = (String, f64)>) -> Vec<Covariate>
             None => best.push(Covariate { name, score }),
         }
     }
-    best.retain(|c| c.score > 0.0);
+    best.retain(|c| c.score > TOLD);
     best.sort_by(|a, b| b.score.total_cmp(&a.score));
     best.truncate(6);
     best
+}
+
+/// The line of one frequency on each axis that it is on, with the evidence for it.
+fn line_at(scene: &Scene, frame: &Frame, empty: &Chosen, cycles_per_orbit: f64) -> Vec<(f64, OrbitLine)> {
+    let rate = std::f64::consts::TAU * cycles_per_orbit / scene.period_s;
+    let [sin, cos]: [Vec<f64>; 2] = [
+        scene.clock_s().iter().map(|t| (rate * t).sin()).collect(),
+        scene.clock_s().iter().map(|t| (rate * t).cos()).collect(),
+    ];
+    let on = |axis: usize| {
+        let columns = [frame.scalar(axis, &sin, LINE_NG), frame.scalar(axis, &cos, LINE_NG)];
+        let gain = empty.gain(&columns);
+        let (mean, _) = Chosen::new(frame, columns.iter().collect(), &[]).posterior();
+        let amplitude_ng = LINE_NG * mean[0].hypot(mean[1]);
+        (gain, OrbitLine { cycles_per_orbit, axis: ["x", "y", "z"][axis].into(), amplitude_ng })
+    };
+    (0..3).map(on).filter(|(gain, _)| *gain > 0.0).collect()
+}
+
+/// The line of a period of its own: to three digits, as it may be between those of [`lines`].
+pub fn line_of_period(scene: &Scene, frame: &Frame, period_s: f64) -> Vec<OrbitLine> {
+    let empty = Chosen::new(frame, Vec::new(), &[]);
+    let cycles = (1000.0 * scene.period_s / period_s).round() / 1000.0;
+    line_at(scene, frame, &empty, cycles).into_iter().map(|(_, line)| line).collect()
 }
 
 /// Lines of the residual in cycles per orbit that stand out of the whole search for lines.
@@ -129,32 +166,9 @@ pub fn lines(scene: &Scene, frame: &Frame) -> Vec<OrbitLine> {
     let empty = Chosen::new(frame, Vec::new(), &[]);
     let cycles: Vec<f64> = (1..=60).map(|i| 0.1 * i as f64).collect();
     let charge = ((cycles.len() * 3) as f64).ln() + 4.0;
-    let lines = |c: &f64| {
-        let rate = std::f64::consts::TAU * c / scene.period_s;
-        let [sin, cos]: [Vec<f64>; 2] = [
-            scene.clock_s().iter().map(|t| (rate * t).sin()).collect(),
-            scene.clock_s().iter().map(|t| (rate * t).cos()).collect(),
-        ];
-        let mut found: Vec<(f64, OrbitLine)> = Vec::new();
-        for axis in 0..3 {
-            let columns = [frame.scalar(axis, &sin, 30.0), frame.scalar(axis, &cos, 30.0)];
-            let gain = empty.gain(&columns);
-            if gain > charge {
-                let (mean, _) = Chosen::new(frame, columns.iter().collect(), &[]).posterior();
-                let amplitude_ng = 30.0 * (mean[0].powi(2) + mean[1].powi(2)).sqrt();
-                found.push((
-                    gain,
-                    OrbitLine {
-                        cycles_per_orbit: (c * 10.0).round() / 10.0,
-                        axis: ["x", "y", "z"][axis].into(),
-                        amplitude_ng,
-                    },
-                ));
-            }
-        }
-        found
-    };
+    let lines = |c: &f64| line_at(scene, frame, &empty, (c * 10.0).round() / 10.0);
     let mut found: Vec<(f64, OrbitLine)> = shared_work::map(&cycles, lines).into_iter().flatten().collect();
+    found.retain(|(gain, _)| *gain > charge);
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     // The side lobes of a stronger line are not lines.
     let mut kept: Vec<OrbitLine> = Vec::new();

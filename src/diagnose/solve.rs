@@ -75,6 +75,8 @@ pub struct Solution {
     pub open: Vec<Weighed>,
     /// Score of every entry alone, at the noise of the null.
     pub singles: Vec<(usize, f64)>,
+    /// The best of them.
+    pub strongest: Set,
 }
 
 impl Solution {
@@ -158,12 +160,12 @@ fn solve_from(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3], stop
         },
         || quietly(scene, library, &noise_null, stop),
     );
-    let ((mut listed, mut open), singles) = found?;
+    let ((mut listed, mut open), Alone { singles, strongest }) = found?;
     let (more_listed, more_open) = more?;
     merge(&mut listed, more_listed);
     merge(&mut open, more_open);
     lessen(scene, entries, &mut listed, stop)?;
-    Some(Solution { listed, open, null, singles })
+    Some(Solution { listed, open, null, singles, strongest })
 }
 
 /// The noise with hardly any slow part, `None` where it has hardly any.
@@ -259,17 +261,19 @@ impl Pool {
     }
 }
 
+/// Every entry alone, at the noise of the null.
+#[derive(Default)]
+struct Alone {
+    singles: Vec<(usize, f64)>,
+    strongest: Set,
+}
+
 /// Sets found at the noise of the best of them, from the null's noise on; and the score of every entry alone at the latter.
-fn converged(
-    scene: &Scene,
-    library: &Library,
-    noise_null: &[AxisNoise; 3],
-    stop: Stop,
-) -> Option<(Pool, Vec<(usize, f64)>)> {
+fn converged(scene: &Scene, library: &Library, noise_null: &[AxisNoise; 3], stop: Stop) -> Option<(Pool, Alone)> {
     let entries = &library.entries;
     let mut noise = *noise_null;
     let mut best_key = Vec::new();
-    let mut singles = Vec::new();
+    let mut alone = Alone::default();
     for round in 0.. {
         let frame = Frame::new(&noise, &scene.schedule, &scene.loudness, &scene.residual_ng);
         let bank = Bank::new(&frame, entries);
@@ -278,11 +282,17 @@ fn converged(
             let nothing = Set::default();
             let chosen = nothing.chosen(&frame);
             let ids: Vec<usize> = (0..entries.len()).collect();
-            singles = shared_work::map(&ids, |i| (*i, search::best_of_entry(&seen, *i, &chosen).0));
+            let singles = shared_work::map(&ids, |i| (*i, search::best_of_entry(&seen, *i, &chosen).0));
+            let best = singles.iter().copied().reduce(|a, b| if b.1 > a.1 { b } else { a });
+            let strongest = best.map_or_else(Set::default, |(i, _)| {
+                let (score, member) = search::best_of_entry(&seen, i, &chosen);
+                Set { members: vec![member], score }
+            });
+            alone = Alone { singles, strongest };
         }
         let pool = Pool::found(scene, library, &frame, &seen, noise, stop)?;
         let again = pool.top().filter(|top| top.score >= WORTH_A_REFIT && round < 2 && top.key() != best_key);
-        let Some(top) = again else { return Some((pool, singles)) };
+        let Some(top) = again else { return Some((pool, alone)) };
         best_key = top.key();
         noise = search::weigh_with_own_noise(scene, entries, top, &noise, 2, 50).noise;
     }

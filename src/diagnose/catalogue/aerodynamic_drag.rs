@@ -9,6 +9,7 @@ pub const EFFECT: Effect = Effect {
     name: "Aerodynamic drag off by a fraction",
     equation: "fraction x a_d, a_d = -1/2 rho Cd A |v| v / m, v relative to co-rotating air",
     source: "density models are 15-20 % off, 50-70 % in storms",
+    covariate: "density",
     mistaken_for: &["scale_factor of the ram axis", "a bias in a fixed attitude", "atmosphere_corotation"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.5, size_max: 3.0, whole: false }],
     nonlinear: &[],
@@ -17,7 +18,7 @@ pub const EFFECT: Effect = Effect {
     signature,
     exact_at: None,
     assumes: None,
-    why: "The residual points against the velocity in every attitude and scales with the modelled drag.",
+    why: "The residual points against the velocity and scales with the modelled drag.",
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {

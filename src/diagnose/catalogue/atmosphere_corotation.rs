@@ -9,6 +9,7 @@ pub const EFFECT: Effect = Effect {
     name: "Co-rotation of the atmosphere",
     equation: "fraction x (a_d(v - w_e x r) - a_d(v))",
     source: "standard; 5-30 ng cross-track",
+    covariate: "latitude",
     mistaken_for: &["thermospheric_wind", "a yaw misalignment", "aerodynamic_drag"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.7, size_max: 2.0, whole: true }],
     nonlinear: &[],

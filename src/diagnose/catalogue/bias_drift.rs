@@ -10,6 +10,7 @@ pub const EFFECT: Effect = Effect {
     name: "Bias drifts",
     equation: "a exp(-(t - t0)/tau), t0 the first instant of the simulation",
     source: "bias law of the flight report: time constants of 6 to 500 h",
+    covariate: "time",
     mistaken_for: &["vent_leak", "temperature_bias", "a trend of density"],
     linear: &push(150.0, 20000.0),
     nonlinear: &[Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.2, range: [7.6, 13.5], ..Nonlinear::PLAIN }],

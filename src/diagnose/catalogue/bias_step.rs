@@ -10,6 +10,7 @@ pub const EFFECT: Effect = Effect {
     name: "Bias step",
     equation: "a after the onset",
     source: "electronic bias shifts were seen between calibrations",
+    covariate: "time_since_onset",
     mistaken_for: &["vent_leak", "a trend of density"],
     linear: &push(60.0, 2000.0),
     nonlinear: &[ONSET],

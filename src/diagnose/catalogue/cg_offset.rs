@@ -11,6 +11,7 @@ pub const EFFECT: Effect = Effect {
     name: "Sensor offset from the centre of gravity differs",
     equation: "a = T dr, T = -G + [w x][w x] + [dw/dt x]",
     source: "standard mechanics; 409 ng per metre radial, 136 cross-track in LVLH at 300 km",
+    covariate: "attitude",
     mistaken_for: &["a bias in a single LVLH attitude", "mass_shift", "rotation"],
     linear: &[
         Linear { name: "dx_m", unit: "m", size: 0.6, size_max: 3.0, whole: false },
@@ -23,7 +24,7 @@ pub const EFFECT: Effect = Effect {
     signature,
     exact_at: None,
     assumes: None,
-    why: "The residual is linear in the gravity-gradient and rotation tensor: it changes with every attitude as a displaced sensor must, and a bias cannot.",
+    why: "The residual is linear in the gravity-gradient and rotation tensor: it turns with attitude and rate as a displaced sensor must, and a bias does not.",
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {

@@ -9,6 +9,7 @@ pub const EFFECT: Effect = Effect {
     name: "Crew activity shifts the mean",
     equation: "a x (1 while the crew is awake)",
     source: "1-20 ng; 16 h on, 8 h off",
+    covariate: "activity",
     mistaken_for: &["a daily temperature cycle"],
     linear: &push(20.0, 500.0),
     nonlinear: &[],

@@ -9,6 +9,7 @@ pub const EFFECT: Effect = Effect {
     name: "Evaporator venting",
     equation: "a x (share of the window inside logged events)",
     source: "flash evaporator: 5-15 min cycles of 50-150 ng",
+    covariate: "time_since_event",
     mistaken_for: &["nearly nothing"],
     linear: &push(60.0, 1000.0),
     nonlinear: &[],

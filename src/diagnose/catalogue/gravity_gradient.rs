@@ -11,6 +11,7 @@ pub const EFFECT: Effect = Effect {
     name: "Gravity gradient left out",
     equation: "-G r, r the assumed offset of the sensor",
     source: "standard mechanics; 409 ng per metre radial at 300 km",
+    covariate: "attitude",
     mistaken_for: &["cg_offset"],
     linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0, whole: true }],
     nonlinear: &[],
@@ -19,7 +20,7 @@ pub const EFFECT: Effect = Effect {
     signature,
     exact_at: None,
     assumes: None,
-    why: "The residual is the gravity gradient at the assumed sensor position: it turns with the local vertical in body axes and follows every attitude change.",
+    why: "The residual is the gravity gradient at the assumed sensor position: it turns with the local vertical in body axes and follows the attitude.",
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {

@@ -10,6 +10,7 @@ pub const EFFECT: Effect = Effect {
     name: "Sensitivity to the geomagnetic field",
     equation: "a = K B, K nine numbers",
     source: "seen on two other flights, Foton M-2 among them",
+    covariate: "geomagnetic_field",
     mistaken_for: &["thermospheric_wind", "atmosphere_corotation"],
     linear: &[
         Linear { name: "kxx_ng_per_t", unit: "ng/T", size: 1.0e6, size_max: 2.0e7, whole: false },

@@ -13,6 +13,7 @@ pub const EFFECT: Effect = Effect {
     name: "Centre of gravity steps at a mass change",
     equation: "a = T dr after the event",
     source: "standard mechanics; 40-400 ng",
+    covariate: "time_since_event",
     mistaken_for: &["bias_step", "cg_offset"],
     linear: &[
         Linear { name: "dx_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },

@@ -10,6 +10,7 @@ pub const EFFECT: Effect = Effect {
     name: "Misaligned sensor axes",
     equation: "a x r, r three small angles",
     source: "one class with a constant attitude error: never separable from acceleration alone",
+    covariate: "modelled_signal",
     mistaken_for: &["atmosphere_corotation"],
     linear: &[
         Linear { name: "rx_rad", unit: "rad", size: 0.08, size_max: 0.6, whole: false },
@@ -22,7 +23,7 @@ pub const EFFECT: Effect = Effect {
     signature,
     exact_at: None,
     assumes: None,
-    why: "What one axis should read leaks into the others with fixed small angles, in every attitude.",
+    why: "What one axis should read leaks into the others with fixed small angles.",
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {

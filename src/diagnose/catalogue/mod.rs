@@ -72,6 +72,8 @@ pub struct Effect {
     pub equation: &'static str,
     /// Where it comes from.
     pub source: &'static str,
+    /// What it follows: a covariate, no cause.
+    pub covariate: &'static str,
     /// What it is mistaken for.
     pub mistaken_for: &'static [&'static str],
     /// Linear coefficients, in the order of the columns.

@@ -9,6 +9,7 @@ pub const EFFECT: Effect = Effect {
     name: "Scale factor of one axis",
     equation: "fraction x m on one axis, m the modelled signal",
     source: "ground and flight calibrations differed by 3-14 %",
+    covariate: "modelled_signal",
     mistaken_for: &["aerodynamic_drag"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 1.5, whole: false }],
     nonlinear: &[Nonlinear { name: "axis", range: [0.0, 2.0], ..Nonlinear::PLAIN }],

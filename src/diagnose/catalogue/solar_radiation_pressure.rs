@@ -11,6 +11,7 @@ pub const EFFECT: Effect = Effect {
     name: "Solar radiation pressure",
     equation: "-nu coefficient P (sum |s_i| area_i) / m s, P = 4.56e-6 N/m2",
     source: "standard; 0.4-2 ng for the Orbiter, more with large panels",
+    covariate: "sun_angle",
     mistaken_for: &["temperature_bias, which lags", "diurnal_bulge"],
     linear: &[Linear { name: "coefficient", unit: "1", size: 4.0, size_max: 40.0, whole: false }],
     nonlinear: &[],

@@ -15,6 +15,7 @@ pub const EFFECT: Effect = Effect {
     name: "Bias follows temperature",
     equation: "slope x T(t - lag)",
     source: "4-30 counts per C, lagged 0-8 h",
+    covariate: "temperature",
     mistaken_for: &["solar_radiation_pressure", "crew_activity", "bias_drift"],
     linear: &[
         Linear { name: "slope_x_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, whole: false },

@@ -14,6 +14,7 @@ pub const EFFECT: Effect = Effect {
     name: "Thermospheric wind",
     equation: "a_d(v - wind) - a_d(v)",
     source: "200 m/s change drag by 2.6 %; several hundred in storms",
+    covariate: "density",
     mistaken_for: &["atmosphere_corotation", "aerodynamic_drag"],
     linear: &[
         Linear { name: "along_m_s", unit: "m/s", size: 300.0, size_max: 800.0, whole: false },

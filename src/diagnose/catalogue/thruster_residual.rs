@@ -9,6 +9,7 @@ pub const EFFECT: Effect = Effect {
     name: "Thruster residual",
     equation: "a x (share of the window inside logged events)",
     source: "1-400 ng after the trimmed mean",
+    covariate: "time_since_event",
     mistaken_for: &["attitude deadband: jets fire at its edges"],
     linear: &push(150.0, 3000.0),
     nonlinear: &[],

@@ -10,6 +10,7 @@ pub const EFFECT: Effect = Effect {
     name: "Clock offset",
     equation: "m(t - offset) - m(t), m the modelled signal",
     source: "under 1 ng per second in a hold, large in manoeuvres",
+    covariate: "modelled_signal",
     mistaken_for: &["an attitude latency (the same)"],
     linear: &[],
     nonlinear: &[Nonlinear {

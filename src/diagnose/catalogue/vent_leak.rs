@@ -10,6 +10,7 @@ pub const EFFECT: Effect = Effect {
     name: "Vent or leak, decaying push",
     equation: "a exp(-(t - onset)/tau) after the onset",
     source: "1 kg/day at 300 m/s is 3.5 ng",
+    covariate: "time_since_onset",
     mistaken_for: &["bias_step", "bias_drift"],
     linear: &push(80.0, 3000.0),
     nonlinear: &[

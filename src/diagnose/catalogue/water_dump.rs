@@ -9,6 +9,7 @@ pub const EFFECT: Effect = Effect {
     name: "Water dump",
     equation: "a x (share of the window inside logged events)",
     source: "about 1 ug in body Y was seen; 250-1000 ng",
+    covariate: "time_since_event",
     mistaken_for: &["nearly nothing"],
     linear: &push(300.0, 5000.0),
     nonlinear: &[],

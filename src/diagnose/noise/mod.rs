@@ -333,4 +333,17 @@ mod tests {
         assert!((found.white_ng / 100.0 - 1.0).abs() < 0.1, "{found:?}");
         assert!((found.slow_ng / 30.0).ln().abs() < 0.5, "{found:?}");
     }
+
+    #[test]
+    fn noise_with_a_memory_and_hardly_a_white_part_is_found_and_is_not_taken_for_slow() {
+        let schedule = gappy();
+        let loudness = Loudness::even(vec![1.0; schedule.len()]);
+        for short_tau_s in [70.0, 110.0] {
+            let noise = AxisNoise { white_ng: 5.0, short_ng: 100.0, short_tau_s, slow_ng: 0.01, slow_tau_s: 3000.0 };
+            let x = simulate(&noise, &schedule, &loudness, normals(5));
+            let [found, ..] = fit([&x, &x, &x], [&[]; 3], &schedule, [&loudness; 3], None, 110);
+            assert!((found.short_ng / 100.0 - 1.0).abs() < 0.1, "{found:?}");
+            assert!((found.short_tau_s / short_tau_s - 1.0).abs() < 0.15 && found.slow_ng < 20.0, "{found:?}");
+        }
+    }
 }

@@ -61,6 +61,8 @@ pub(super) fn line(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
         axis: format!("mostly {}", ["x", "y", "z"][loudest]),
         axes: sharing(amplitude),
         location: "a line of the spectrum, of its own period".into(),
+        spans_s: Vec::new(),
+        period_s: Some(period(0.5)),
     })
 }
 

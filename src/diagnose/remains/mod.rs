@@ -34,6 +34,10 @@ pub struct Remains {
     pub axes: Vec<String>,
     /// In words: where it lives.
     pub location: String,
+    /// When, where it is not always there.
+    pub spans_s: Vec<[f64; 2]>,
+    /// Its period, where it has one: the middle one if it drifts.
+    pub period_s: Option<f64>,
 }
 
 /// What remains of what a hypothesis leaves, at its noise. The least probable of all that was asked.
@@ -47,8 +51,11 @@ pub fn strongest(
     let grid = Grid::new(&schedule.clock_s, &left.whitened)?;
     let scale_ng = noise.map(|n| n.rms_ng());
     let binned = std::array::from_fn(|k| Binned::new(&left.residual_ng[k], &noise[k], schedule, &loudness[k]));
-    let asked =
-        [together::together(&grid, scale_ng), line::line(&grid, scale_ng), switching::switching(&binned, noise)];
+    let asked = [
+        together::together(&grid, scale_ng),
+        line::line(&grid, scale_ng),
+        switching::switching(&binned, noise, schedule.clock_s[0]),
+    ];
     let questions = asked.len() as f64;
     asked
         .into_iter()

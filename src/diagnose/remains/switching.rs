@@ -34,7 +34,7 @@ const AXES: [&[usize]; 7] = [&[0], &[1], &[2], &[0, 1], &[0, 2], &[1, 2], &[0, 1
 type Switching = (f64, &'static [usize], Chain);
 
 /// Whether it switches.
-pub(super) fn switching(binned: &[Binned; 3], noise: &[AxisNoise; 3]) -> Option<Remains> {
+pub(super) fn switching(binned: &[Binned; 3], noise: &[AxisNoise; 3], begins_s: f64) -> Option<Remains> {
     let bins = (0..binned[0].mean_ng.len()).filter(|i| binned.iter().all(|b| b.variance_ng2[*i].is_finite())).count();
     if bins < BINS_MIN {
         return None;
@@ -73,7 +73,22 @@ pub(super) fn switching(binned: &[Binned; 3], noise: &[AxisNoise; 3]) -> Option<
             "two levels, {} switches; on the average {on_s:.0} s at s = 1 and {off_s:.0} s at s = 0",
             chain.switches
         ),
+        spans_s: spans_up(&chain.up, begins_s),
+        period_s: None,
     })
+}
+
+/// When it is more likely up than down.
+fn spans_up(up: &[f64], begins_s: f64) -> Vec<[f64; 2]> {
+    let mut spans: Vec<[f64; 2]> = Vec::new();
+    for (i, _) in up.iter().enumerate().filter(|(_, up)| **up > 0.5) {
+        let [from_s, to_s] = [i, i + 1].map(|bin| begins_s + bin as f64 * BIN_S);
+        match spans.last_mut() {
+            Some(last) if last[1] == from_s => last[1] = to_s,
+            _ => spans.push([from_s, to_s]),
+        }
+    }
+    spans
 }
 
 #[cfg(test)]
@@ -117,13 +132,16 @@ mod tests {
 
     #[test]
     fn a_push_that_switches_is_found_with_its_size_and_slow_noise_is_none() {
-        let found = switching(&record(1, 0.0, 80.0), &[NOISE; 3]).unwrap();
+        let found = switching(&record(1, 0.0, 80.0), &[NOISE; 3], 0.0).unwrap();
+        // Each level lasts 5,000 s in the mean.
+        let up_s: f64 = found.spans_s.iter().map(|[from, to]| to - from).sum();
+        assert!(found.spans_s.len() > 5 && (30_000.0..100_000.0).contains(&up_s), "{:?}", found.spans_s);
         assert!(found.probability < 1e-6 && found.axes == ["y"], "{found:?}");
         let size: f64 = found.axis.split(", ").nth(1).and_then(|x| x.parse().ok()).unwrap();
         assert!((size.abs() - 80.0).abs() < 8.0, "{found:?}");
         // Forty records of slow noise: a probability below a ten-thousandth has one chance in two hundred and fifty among them.
         for seed in 0..40 {
-            let probability = switching(&record(seed, 15.0, 0.0), &[NOISE; 3]).map_or(1.0, |r| r.probability);
+            let probability = switching(&record(seed, 15.0, 0.0), &[NOISE; 3], 0.0).map_or(1.0, |r| r.probability);
             assert!(probability > 1e-4, "{seed}: {probability}");
         }
     }
@@ -134,7 +152,7 @@ mod tests {
     fn slow_noise_is_as_improbable_as_a_chain_as_is_said() {
         let of = |seed: u64| {
             let slow_ng = 5.0 + 0.25 * (seed % 100) as f64;
-            switching(&record(seed, slow_ng, 0.0), &[NOISE; 3]).map_or(1.0, |found| found.probability)
+            switching(&record(seed, slow_ng, 0.0), &[NOISE; 3], 0.0).map_or(1.0, |found| found.probability)
         };
         let all: Vec<f64> = (0..3000).map(of).collect();
         for p in [0.5, 0.05, EQUAL] {

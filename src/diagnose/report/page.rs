@@ -67,6 +67,9 @@ pub(in crate::diagnose) fn open_diagnosis(case: &str, verdict: Verdict) -> Strin
     open(&format!("Diagnosis of {case}: {verdict}"), &format!("Recording against simulation: {case}"), "", verdict)
 }
 
+/// Share of an effect that one attitude must tell of another to be said to predict it.
+const PREDICTED_LEAST: f64 = 0.05;
+
 fn under(d: &Diagnosis, plates: &Plates) -> String {
     let mut line = format!("Verdict: {}", d.verdict.word());
     let _ = write!(line, " · false-alarm probability {}", probability(d.false_alarm_probability));
@@ -162,7 +165,13 @@ fn held_out(page: &mut String, d: &Diagnosis) {
             100.0 * share
         );
     }
-    if let Some(held) = &fit.left_out_attitudes {
+    if let Some(held) = fit.left_out_attitudes.as_ref().filter(|held| held.excess_removed < PREDICTED_LEAST) {
+        let scheme = escaped(&held.scheme);
+        let _ = writeln!(
+            page,
+            "<p>Attitudes ({scheme}): what is left in does not say how large this is in what is left out.</p>"
+        );
+    } else if let Some(held) = &fit.left_out_attitudes {
         let _ = writeln!(
             page,
             "<p>Attitudes: {}; log score gained {} ± {}.</p>",
@@ -221,10 +230,8 @@ fn competition(page: &mut String, d: &Diagnosis) {
         page.push_str("</ul>\n");
     }
     if let Some(s) = &d.separating_observation {
-        let gain =
-            s.gain.map_or(String::new(), |gain| format!(" It would separate them by {} standard errors.", short(gain)));
         let (kind, text) = (escaped(&words(&s.kind)), escaped(&s.text));
-        let _ = writeln!(page, "<p>The cheapest observation that would decide ({kind}): {text}{gain}</p>");
+        let _ = writeln!(page, "<p>The cheapest observation that tells most of them apart ({kind}): {text}</p>");
     }
     if !d.alternatives.is_empty() {
         let rows = d.alternatives.iter().map(|a| vec![joined(&a.effects), short(a.posterior), short(a.delta_bic)]);

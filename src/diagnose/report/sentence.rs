@@ -48,8 +48,11 @@ fn explained(d: &Diagnosis) -> String {
             short(norm(fit.noise_floor_ng))
         )
     });
-    let why = d.effects.first().map_or(String::new(), |e| format!(" {}", e.why.trim()));
-    format!("The simulation lacks {}.{why}{gain}", listed(&names, "and"))
+    let why = match d.effects.as_slice() {
+        [only] => format!(" {}", only.why.trim()),
+        all => all.iter().map(|e| format!(" {}: {}", e.name, lower_first(e.why.trim()))).collect(),
+    };
+    format!("What the simulation lacks or has wrong: {}.{why}{gain}", listed(&names, "and"))
 }
 
 fn ambiguous(d: &Diagnosis) -> String {

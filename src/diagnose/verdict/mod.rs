@@ -20,7 +20,7 @@ use self::named::name;
 use self::nearest::nearest;
 use self::stands::tried;
 use self::unnamed::{hypothesis, of_failure, of_remains};
-use super::answer::{Diagnosis, Located, Verdict};
+use super::answer::{Diagnosis, Interval, Located, Verdict};
 use super::bursts::OUT;
 use super::case::SPIKE;
 use super::catalogue::Effect;
@@ -123,8 +123,9 @@ fn of_the_mismatch(
     let null_frame = solution.null.frame(scene);
     let Some(weighed) = chosen else {
         answer.notes = notes;
+        answer.located = unclaimed(scene, library, &null_frame, solution, std::mem::take(&mut answer.located));
         if let Some(r) = remains.filter(|_| verdict == Verdict::Unexplained) {
-            answer.located.axes.clone_from(&r.axes);
+            answer.located = of_what_remains(scene, &null_frame, &r, answer.located);
             answer.hypothesis = Some(of_remains(&r, ""));
         }
         if verdict == Verdict::Consistent && failure.is_none() {
@@ -147,7 +148,7 @@ fn of_the_mismatch(
     answer.located = Located {
         covariates,
         per_orbit_lines: locate::lines(scene, &best.frame),
-        ..locate::of_signal(scene, &signal, why_here(&best))
+        ..locate::of_signal(scene, &signal, &onsets_s(&best.fits))
     };
     answer.upper_limits = upper_limits(library, &best.frame, &best.set);
     match verdict {
@@ -246,14 +247,41 @@ fn with_remains(
     }
 }
 
-fn why_here(best: &Best) -> &'static str {
-    let onset = best.fits.iter().any(|f| f.parameters.iter().any(|p| p.name == "onset_s"));
-    if onset { "onset" } else { "largest part of the mismatch" }
+/// Where the strongest single hypothesis is, named or not, if it stands out of all of them.
+fn unclaimed(scene: &Scene, library: &Library, frame: &Frame, solution: &Solution, located: Located) -> Located {
+    let strongest = &solution.strongest;
+    let per_orbit_lines = locate::lines(scene, frame);
+    if strongest.score <= locate::TOLD {
+        return Located { per_orbit_lines, ..located };
+    }
+    let signal = sum(scene, &strongest.contributions(scene, frame, &library.entries));
+    let fits = model::parameters(scene, frame, &library.entries, strongest, 1.0);
+    let covariates = located.covariates;
+    Located { covariates, per_orbit_lines, ..locate::of_signal(scene, &signal, &onsets_s(&fits)) }
+}
+
+/// Where what remains is.
+fn of_what_remains(scene: &Scene, frame: &Frame, remains: &Remains, located: Located) -> Located {
+    let mut per_orbit_lines = located.per_orbit_lines;
+    if let Some(period_s) = remains.period_s {
+        per_orbit_lines.splice(0..0, locate::line_of_period(scene, frame, period_s));
+    }
+    let span =
+        |[start_s, end_s]: &[f64; 2]| Interval { start_s: *start_s, end_s: *end_s, why: "the upper level".into() };
+    let intervals = match remains.spans_s.is_empty() {
+        true => located.intervals,
+        false => remains.spans_s.iter().map(span).collect(),
+    };
+    Located { axes: remains.axes.clone(), intervals, per_orbit_lines, ..located }
+}
+
+fn onsets_s(fits: &[MemberFit]) -> Vec<f64> {
+    fits.iter().flat_map(|fit| &fit.parameters).filter(|p| p.name == "onset_s").map(|p| p.value).collect()
 }
 
 fn covariate(library: &Library, entry: usize) -> String {
     match library.entries[entry].family {
-        Family::Listed(effect) => effect.id.to_string(),
+        Family::Listed(effect) => effect.covariate.to_string(),
         Family::Open(i) => library.forms[i].covariate.to_string(),
     }
 }

@@ -9,6 +9,8 @@
 //!
 //! Not simulated: events to come (none are assumed), and whether a log is complete, for which a share stands.
 
+mod outcome;
+
 use std::sync::Arc;
 
 use crate::math::shared_work;
@@ -17,6 +19,7 @@ use crate::physics::orbit::{self, State};
 use crate::physics::{J2, Vec3, drag, gravity_gradient, rotation};
 use crate::units::NANO_G_M_S2;
 
+use self::outcome::{Action, Candidate, Outcome, Pair, round};
 use super::answer::SeparatingObservation;
 use super::case::{Ancillary, Case, Expectation, Simulation, WINDOW_STRIDE_S};
 use super::catalogue::{Effect, Shape, Theta};
@@ -24,16 +27,12 @@ use super::design::{Chosen, Column, Frame, Raw};
 use super::noise::AxisNoise;
 use super::scene::{Axes, Scene, Surroundings};
 
-/// Log evidence at which an observation decides: odds of twenty to one.
-const DECISIVE: f64 = 3.0;
 /// Grid of what is to come, s.
 const GRID_S: f64 = 30.0;
 /// A turn takes this long, and nothing is compared meanwhile, s.
 const TURN_S: f64 = 600.0;
 /// What a candidate may last, h.
 const HOURS: [f64; 4] = [1.5, 3.0, 6.0, 12.0];
-/// What a turn of the vehicle costs beside the hours, in hours.
-const MANOEUVRE_COST_H: f64 = 3.0;
 /// An attitude this near to the one held is none to turn to, rad.
 const NEAR_RAD: f64 = 0.5;
 /// Share of real leaks that a pressure or valve log shows, and of records without one that seem to.
@@ -64,14 +63,6 @@ pub struct Part {
 /// A set that may be the true one.
 pub type Rival = Vec<Part>;
 
-/// What could be done.
-#[derive(Clone, Copy)]
-enum Action {
-    Turn,
-    Hold([f64; 3], &'static str),
-    Freeze,
-}
-
 /// The cheapest observation that is expected to decide between the rivals, or the best there is; `None` where nothing can be flown.
 pub fn cheapest(scene: &Scene, noise: &[AxisNoise; 3], rivals: &[Rival]) -> Option<SeparatingObservation> {
     if let Some(log) = consult_log(scene, rivals) {
@@ -83,64 +74,16 @@ pub fn cheapest(scene: &Scene, noise: &[AxisNoise; 3], rivals: &[Rival]) -> Opti
         actions(scene).into_iter().flat_map(|action| HOURS.map(|hours| Candidate { action, hours })).collect();
     candidates.sort_by(|a, b| a.cost_h().total_cmp(&b.cost_h()));
     let mut best: Option<Outcome> = None;
-    // One that decides beats whatever costs more.
+    // One that parts as many beats whatever costs more; one that parts all ends the search.
     for equal in candidates.chunk_by(|a, b| a.cost_h() == b.cost_h()) {
         let flown = shared_work::map(equal, |candidate| fly(scene, noise, &sets, &now, *candidate));
-        best = best.into_iter().chain(flown.into_iter().flatten()).reduce(|a, b| if b.gain > a.gain { b } else { a });
-        if best.as_ref().is_some_and(|best| best.gain >= DECISIVE) {
+        let better = |a: Outcome, b: Outcome| if b.beats(&a) { b } else { a };
+        best = best.into_iter().chain(flown.into_iter().flatten()).reduce(better);
+        if best.as_ref().is_some_and(|best| best.parted() == best.pairs.len()) {
             break;
         }
     }
-    best.map(|outcome| outcome.told())
-}
-
-/// An action for so many hours.
-#[derive(Clone, Copy)]
-struct Candidate {
-    action: Action,
-    hours: f64,
-}
-
-impl Candidate {
-    /// What it costs, in hours.
-    fn cost_h(&self) -> f64 {
-        self.hours + if matches!(self.action, Action::Turn) { 0.0 } else { MANOEUVRE_COST_H }
-    }
-}
-
-/// What the simulation of a candidate shows.
-struct Outcome {
-    candidate: Candidate,
-    gain: f64,
-    differ_ng: [f64; 3],
-}
-
-impl Outcome {
-    fn told(&self) -> SeparatingObservation {
-        let [x, y, z] = self.differ_ng.map(|ng| format!("{ng:.0}"));
-        let (kind, what) = match self.candidate.action {
-            Action::Turn => (
-                "table_flip",
-                "Measure with the sensor's table turned by 180 degrees, the attitude held as it is,".to_string(),
-            ),
-            Action::Hold([roll, pitch, yaw], words) => (
-                "attitude",
-                format!("Hold {words} (local vertical, roll {roll:.0}, pitch {pitch:.0}, yaw {yaw:.0} degrees)"),
-            ),
-            Action::Freeze => ("attitude", "Hold the present attitude fixed to the stars".to_string()),
-        };
-        let verdict = if self.gain >= DECISIVE { "" } else { " That alone does not decide; nothing flown here does." };
-        let text = format!(
-            "{what} for {} h: the sets then differ by {x}, {y} and {z} ng rms along X, Y, Z from what they agree on now, and the true \
-             one is expected to gain {:.1} in log evidence on its nearest rival.{verdict}",
-            self.candidate.hours, self.gain
-        );
-        SeparatingObservation { kind: kind.into(), text, gain: Some(round(self.gain)) }
-    }
-}
-
-fn round(x: f64) -> f64 {
-    (x * 100.0).round() / 100.0
+    best.map(|outcome| outcome.told(rivals))
 }
 
 /// Where every pair of rivals differs by a leak, a log of pressures and valves decides without any flying.
@@ -277,11 +220,9 @@ impl Contest {
         Some(Self { predicted, left })
     }
 
-    /// What this record adds to another one for the true set against its nearest rival, in the worst case.
-    fn adds_to(&self, now: &Contest) -> f64 {
-        let sets = self.left.len();
-        let pairs = (0..sets).flat_map(|a| (0..sets).map(move |b| (a, b))).filter(|(a, b)| a != b);
-        pairs.map(|(a, b)| self.left[a][b] - now.left[a][b]).fold(f64::INFINITY, f64::min)
+    /// What this record adds to another one for a true set against a rival.
+    fn adds_to(&self, now: &Contest, truth: usize, rival: usize) -> f64 {
+        self.left[truth][rival] - now.left[truth][rival]
     }
 }
 
@@ -350,17 +291,21 @@ fn fly(scene: &Scene, noise: &[AxisNoise; 3], sets: &[Fitted], now: &Contest, ca
     let first = scene.schedule.len();
     let turned = matches!(action, Action::Turn).then_some(first);
     let then = Contest::new(&ahead, noise, sets, turned)?;
-    let differ_ng = std::array::from_fn(|k| {
-        let pairs = (0..sets.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
-        let rms = |(a, b): (usize, usize)| {
+    let differ_ng = |a: usize, b: usize| {
+        std::array::from_fn(|k| {
             let series: Vec<f64> = then.predicted[a][k].iter().zip(&then.predicted[b][k]).map(|(x, y)| x - y).collect();
             let before = series[..first].iter().sum::<f64>() / first as f64;
             let new = &series[first..];
             (new.iter().map(|d| (d - before).powi(2)).sum::<f64>() / new.len().max(1) as f64).sqrt()
-        };
-        pairs.map(rms).fold(f64::INFINITY, f64::min)
-    });
-    Some(Outcome { candidate, gain: then.adds_to(now), differ_ng })
+        })
+    };
+    let pairs = (0..sets.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+    let pair = |(a, b): (usize, usize)| Pair {
+        sets: [a, b],
+        gain: then.adds_to(now, a, b).min(then.adds_to(now, b, a)),
+        differ_ng: differ_ng(a, b),
+    };
+    Some(Outcome { candidate, pairs: pairs.map(pair).collect() })
 }
 
 /// The case with what is to come behind it: windows, simulation, orbit and environment.
