@@ -93,6 +93,7 @@ fn what_nothing_can_be_is_refused_with_its_place() {
             }),
             "simulation.csv: its grid is too coarse: 0 windows",
         ),
+        (with_cell("simulation.csv", None, "ax_ng", "4e-7"), "simulation.csv: `ax_ng` has a typical size of 4.000e-7"),
         (
             with_lines("case.toml", |lines| lines.retain(|line| !line.starts_with("sensor_offset_m"))),
             "case.toml: `vehicle.sensor_offset_m` must be three finite numbers, found nothing",
