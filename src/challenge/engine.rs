@@ -1,8 +1,8 @@
 //! The project's own analyser as the one under test: it gets files through the real reader, or a directory, and nothing else.
 
 use super::run::{Analyser, Material};
-use crate::diagnose::case::{Case, Header};
-use crate::diagnose::{Settings, analyse, recorder};
+use crate::diagnose::case::Case;
+use crate::diagnose::{Settings, analyse, folder, recorder};
 
 /// The analyser with its settings.
 #[derive(Debug, Clone, Default)]
@@ -18,13 +18,14 @@ pub struct Engine {
 /// # Errors
 /// One sentence: what is missing or wrong.
 pub fn read(material: &Material) -> Result<Case, String> {
-    let file = |name: &str| match material {
-        Material::Files(files) => files.iter().find(|(n, _)| n == name).map(|(_, octets)| octets.clone()),
-        Material::Directory(path) => std::fs::read(path.join(name)).ok(),
+    let case = match material {
+        Material::Files(files) => {
+            let file = |name: &str| Ok(files.iter().find(|(n, _)| n == name).map(|(_, octets)| octets.clone()));
+            recorder::case(file, &[])
+        }
+        Material::Directory(path) => folder::case(path, &[]),
     };
-    let header = file("case.toml").and_then(|octets| String::from_utf8(octets).ok()).ok_or("there is no case.toml")?;
-    let header = Header::parse(&header, &[]).map_err(|e| e.to_string())?;
-    recorder::case(header, file).map_err(|e| e.to_string())
+    case.map_err(|error| error.to_string())
 }
 
 impl Analyser for Engine {

@@ -1,16 +1,16 @@
 //! `oare diagnose CASE_DIR`: what did the simulation leave out?
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
 use oare_ground::diagnose::analysis::{Analysis, Prepared, Settings};
 use oare_ground::diagnose::answer::Diagnosis;
-use oare_ground::diagnose::case::{Case, Header};
+use oare_ground::diagnose::catalogue;
 use oare_ground::diagnose::error::CaseError;
 use oare_ground::diagnose::measured::{self, MeasuredCase};
-use oare_ground::diagnose::{recorder, report};
+use oare_ground::diagnose::{folder, report};
 
 use super::output::{write, write_report};
 
@@ -38,7 +38,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0)]
     bootstraps: usize,
     /// Catalogue effects to leave out.
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',', value_parser = effect)]
     without: Vec<String>,
     /// False-alarm probability at or below which something is claimed.
     #[arg(long, default_value_t = 0.002, value_parser = probability)]
@@ -47,6 +47,13 @@ pub struct Args {
 
 /// Orbits, series and poses: recordings of another kind, the same answer in their own unit.
 fn measured(args: &Args) -> anyhow::Result<ExitCode> {
+    for (given, option) in [(args.bootstraps > 0, "--bootstraps"), (!args.without.is_empty(), "--without")] {
+        if given {
+            eprintln!(
+                "oare: {option} is for accelerations against a simulation, and does nothing to a case of this kind"
+            );
+        }
+    }
     let read = oare_ground::challenge::real::read(&args.case, &args.set).map_err(anyhow::Error::from);
     let (answer, plates) = match read.and_then(|(case, files)| Ok(measured::analyse(&case, &files)?)) {
         Ok(found) => found,
@@ -115,7 +122,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 fn analyse(args: &Args) -> Result<Analysis, CaseError> {
-    let case = read_case(&args.case, &args.set)?;
+    let case = folder::case(&args.case, &args.set)?;
     let settings = Settings {
         seed: args.seed,
         bootstraps: args.bootstraps,
@@ -132,6 +139,16 @@ fn analyse(args: &Args) -> Result<Analysis, CaseError> {
     Ok(prepared.conclude(reached))
 }
 
+fn effect(text: &str) -> Result<String, String> {
+    match catalogue::by_id(text) {
+        Some(_) => Ok(text.into()),
+        None => {
+            let known: Vec<&str> = catalogue::ALL.iter().map(|effect| effect.id).collect();
+            Err(format!("the catalogue has no such effect; it has {}", known.join(", ")))
+        }
+    }
+}
+
 fn probability(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(p) if p > 0.0 && p < 1.0 => Ok(p),
@@ -139,49 +156,10 @@ fn probability(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Reads a case directory.
-///
-/// # Errors
-/// [`CaseError`] with one sentence that names the file and the value.
-pub fn read_case(directory: &Path, set: &[String]) -> Result<Case, CaseError> {
-    let toml = octets(directory, "case.toml").and_then(|octets| {
-        let missing = || CaseError::MissingFile { file: directory.join("case.toml").display().to_string() };
-        text("case.toml", octets.ok_or_else(missing)?)
-    })?;
-    let header = Header::parse(&toml, set)?;
-    // What is there and cannot be read is not missing.
-    for name in [&header.files.simulation, &header.files.ancillary, &header.files.events, &header.files.recording] {
-        if let Some(octets) = octets(directory, name)?
-            && (*name != header.files.recording || header.kind == "acceleration_csv")
-        {
-            text(name, octets)?;
-        }
-    }
-    recorder::case(header, |name| octets(directory, name).ok().flatten())
-}
-
-/// The octets of a file of a case, `None` where there is none.
-fn octets(directory: &Path, name: &str) -> Result<Option<Vec<u8>>, CaseError> {
-    let unreadable = |reason: String| CaseError::Unreadable { file: name.into(), reason };
-    let path = directory.join(name);
-    match std::fs::metadata(&path) {
-        Err(_) => Ok(None),
-        Ok(_) if name.is_empty() => Ok(None),
-        Ok(metadata) if !metadata.is_file() => Err(unreadable("it is not a regular file".into())),
-        Ok(_) => std::fs::read(&path).map(Some).map_err(|error| unreadable(error.to_string())),
-    }
-}
-
-fn text(name: &str, octets: Vec<u8>) -> Result<String, CaseError> {
-    String::from_utf8(octets).map_err(|error| CaseError::Unreadable {
-        file: name.into(),
-        reason: format!("octet {} is no UTF-8 text", error.utf8_error().valid_up_to() + 1),
-    })
-}
-
 fn print_table(diagnosis: &Diagnosis) {
     let verdict = diagnosis.verdict.word();
-    println!("{}: {verdict} (false-alarm probability {:.1e})", diagnosis.case, diagnosis.false_alarm_probability);
+    let from = diagnosis.false_alarm_from.map_or(String::new(), |source| format!(", by the {}", source.words()));
+    println!("{}: {verdict} (false-alarm probability {:.1e}{from})", diagnosis.case, diagnosis.false_alarm_probability);
     for effect in &diagnosis.effects {
         println!("  {:<28} posterior {:.3}", effect.id, effect.posterior);
         if let Some(axis) = &effect.axis {

@@ -9,6 +9,7 @@ use crate::diagnose::case::{Expectation, Header, Texts};
 use crate::diagnose::catalogue;
 use crate::diagnose::error::CaseError;
 use crate::diagnose::live::Policy;
+use crate::diagnose::{folder, recorder};
 use crate::units::MissionTime;
 
 /// Which files, and how often.
@@ -81,14 +82,22 @@ impl DiagnosisConfig {
             }
         }
         files.recording = "the windows so far".into();
-        let text = |name: &str| fs::read_to_string(name).ok();
+        let mut faults = Vec::new();
+        let mut text = |key: &str, name: &str| {
+            let octets = if name.is_empty() { Ok(None) } else { folder::octets(Path::new(""), name) };
+            let text = octets.and_then(|octets| octets.map(|octets| recorder::text(name, octets)).transpose());
+            text.unwrap_or_else(|error| {
+                faults.push(at(key, error.to_string()));
+                None
+            })
+        };
         let texts = Texts {
             recording: None,
-            simulation: text(&files.simulation),
-            ancillary: text(&files.ancillary),
-            events: text(&files.events),
+            simulation: text("simulation", &files.simulation),
+            ancillary: text("ancillary", &files.ancillary),
+            events: text("events", &files.events),
         };
-        let mut faults = Vec::new();
+        let unreadable: Vec<String> = faults.iter().map(|fault| fault.place.clone()).collect();
         if header.epoch_utc != time.epoch_utc {
             let sentence = format!(
                 "its epoch_utc is {} and mission.epoch_utc is {}: one clock cannot have two zeros",
@@ -107,7 +116,8 @@ impl DiagnosisConfig {
                     Some(file) if *file == files.events => "events",
                     _ => "case",
                 };
-                faults.extend(errors.iter().map(|error| at(key(error), error.to_string())));
+                let told = errors.iter().map(|error| at(key(error), error.to_string()));
+                faults.extend(told.filter(|fault| !unreadable.contains(&fault.place)));
                 Err(faults)
             }
         }

@@ -2,17 +2,17 @@
 //!
 //! Deterministic: the seed serves the bootstrap alone. Not here: files.
 
-use super::answer::Diagnosis;
+use super::answer::{Diagnosis, Source};
 use super::bootstrap::{Bootstrap, Reached};
 use super::bursts::solve_beside_bursts;
 use super::case::Case;
 use super::error::CaseError;
 use super::null_table;
-use super::report::{CovariatePlate, Plates};
-use super::scene::{Axes, Scene};
+use super::plates::plates;
+use super::report::Plates;
+use super::scene::Scene;
 use super::solve::{Library, Solution, null_noise};
 use super::verdict::{self, Proof};
-use crate::math::rms::about_mean;
 use crate::math::shared_work;
 
 /// How to analyse.
@@ -95,57 +95,21 @@ impl<'a> Prepared<'a> {
     /// False-alarm probability, from the bootstrap where there was one, else from the table of nulls, and verdict.
     pub fn conclude(&self, reached: Option<Reached>) -> Analysis {
         let table = null_table::false_alarm_probability(self.statistic, self.solution.null.slow_evidence);
-        let decisive = match reached {
+        let (probability, source) = match reached {
             // Few replicates cannot show a small probability: then the table decides, and the bootstrap may only forbid.
-            Some(r) if r.least <= self.settings.claim_probability || r.probability > 3.0 * r.least => r.probability,
-            _ => table,
+            Some(r) if r.least <= self.settings.claim_probability || r.probability > 3.0 * r.least => {
+                (r.probability, Source::Bootstrap)
+            }
+            _ => (table, Source::NullTable),
         };
         let proof = Proof {
             statistic: self.statistic,
-            probability: decisive,
+            probability,
+            source,
             claim: self.settings.claim_probability,
             chances: 1.0,
         };
         let (diagnosis, model_ng, ladder) = verdict::conclude(&self.scene, &self.library, &self.solution, proof);
-        Analysis { plates: plates(&self.scene, model_ng, ladder), diagnosis }
+        Analysis { plates: plates(&self.scene, &diagnosis, &model_ng, ladder), diagnosis }
     }
-}
-
-fn plates(scene: &Scene, model_ng: Axes, ladder: Vec<(String, f64)>) -> Plates {
-    let plate =
-        |name: &str, unit: &str, values: Vec<f64>| CovariatePlate { name: name.into(), unit: unit.into(), values };
-    let degrees = |x: f64| x.to_degrees();
-    let covariates = vec![
-        plate(
-            "argument of latitude",
-            "deg",
-            at_windows(scene, |g| {
-                let state = crate::physics::orbit::State { r_m: scene.r_m[g], v_m_s: scene.v_m_s[g] };
-                degrees(crate::physics::orbit::argument_of_latitude_rad(&state))
-            }),
-        ),
-        plate(
-            "Sun zenith angle",
-            "deg",
-            at_windows(scene, |g| degrees(scene.sun[g].dot(&scene.r_m[g].normalize()).clamp(-1.0, 1.0).acos())),
-        ),
-        plate("sensor temperature", "C", at_windows(scene, |g| scene.temperature_c[g])),
-        plate("modelled drag", "ng", at_windows(scene, |g| scene.drag_ng[g].norm())),
-    ];
-    Plates {
-        clock_s: scene.clock_s().to_vec(),
-        liftoff_clock_s: scene.case.header.liftoff_clock_s,
-        before_ng: std::array::from_fn(|k| about_mean(&scene.residual_ng[k])),
-        model_ng: std::array::from_fn(|k| about_mean(&model_ng[k])),
-        sunlit: at_windows(scene, |g| scene.sunlit[g]),
-        events: scene.case.events.iter().map(|e| (e.clock_s, e.clock_s + e.duration_s, e.kind.clone())).collect(),
-        covariates,
-        period_s: scene.period_s,
-        ladder,
-    }
-}
-
-fn at_windows(scene: &Scene, on_grid: impl Fn(usize) -> f64) -> Vec<f64> {
-    let nearest = |t: &f64| scene.grid_s.partition_point(|g| g < t).min(scene.grid_s.len() - 1);
-    scene.clock_s().iter().map(|t| on_grid(nearest(t))).collect()
 }

@@ -13,6 +13,9 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// Probability that a record without any mismatch scores as high as this one did.
     pub false_alarm_probability: f64,
+    /// What says so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub false_alarm_from: Option<Source>,
     /// The statistic behind it: log posterior odds of the best hypothesis against none, less what they owe to noise that is louder than
     /// the noise fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -53,6 +56,7 @@ impl Diagnosis {
             case: case.into(),
             verdict: Verdict::Consistent,
             false_alarm_probability,
+            false_alarm_from: None,
             statistic: None,
             slow_evidence: None,
             located: Located { frame: "body".into(), ..Located::default() },
@@ -65,6 +69,35 @@ impl Diagnosis {
             cannot_tell_apart: Vec::new(),
             arcs: Vec::new(),
             notes: Vec::new(),
+        }
+    }
+}
+
+/// Where a false-alarm probability comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// Records of noise alone, simulated once.
+    NullTable,
+    /// Replicates of this record's own noise.
+    Bootstrap,
+    /// The bound of Ville over all looks at a record that grows.
+    Looks,
+    /// What remains beside every set, by its own bound.
+    Remains,
+    /// The calibration of a dump, by its bound for false faults.
+    Calibration,
+}
+
+impl Source {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::NullTable => "table of nulls",
+            Self::Bootstrap => "bootstrap of this record",
+            Self::Looks => "bound over all looks so far",
+            Self::Remains => "bound of what remains",
+            Self::Calibration => "calibration of the dump",
         }
     }
 }

@@ -138,6 +138,46 @@ pub enum CaseError {
         /// Windows needed.
         needed: usize,
     },
+    /// A dump without a window to compare.
+    #[error(
+        "{file}: no calibrated window is in its {octets} octets: it is no dump, its calibrations are missing, or \
+         case.epoch_utc and case.liftoff_clock_s are of another mission"
+    )]
+    NoWindows {
+        /// File.
+        file: String,
+        /// Its length.
+        octets: usize,
+    },
+    /// A span that ends before it begins.
+    #[error("case.toml: `case.end_s` ({end_s} s) must be after `case.start_s` ({start_s} s)")]
+    Span {
+        /// Where it begins.
+        start_s: f64,
+        /// Where it ends.
+        end_s: f64,
+    },
+    /// Two columns that contradict each other.
+    #[error(
+        "{file}: `{column}` is not how {other} change: its typical size is {found:.3e} {unit}, theirs {expected:.3e}, and what \
+         they differ by {apart:.3e}"
+    )]
+    Contradiction {
+        /// File.
+        file: String,
+        /// Columns given.
+        column: String,
+        /// Columns they are the rate of.
+        other: &'static str,
+        /// Unit.
+        unit: &'static str,
+        /// Median size given.
+        found: f64,
+        /// Median size of the change of the others.
+        expected: f64,
+        /// Median size of the difference.
+        apart: f64,
+    },
     /// Too little to work with.
     #[error("{file}: {found} rows, and at least {needed} are needed")]
     TooFew {
@@ -192,9 +232,13 @@ impl CaseError {
             | Self::Beyond { file, .. }
             | Self::Frozen { file, .. }
             | Self::TooCoarse { file, .. }
+            | Self::NoWindows { file, .. }
+            | Self::Contradiction { file, .. }
             | Self::TooFew { file, .. }
             | Self::NoOverlap { file, .. } => Some(file),
-            Self::Unnamed | Self::Toml(_) | Self::Key { .. } | Self::Kind(_) | Self::Numeric(_) => None,
+            Self::Unnamed | Self::Toml(_) | Self::Key { .. } | Self::Span { .. } | Self::Kind(_) | Self::Numeric(_) => {
+                None
+            }
         }
     }
 }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::answer::{Diagnosis, Verdict};
+use super::answer::{Diagnosis, Source, Verdict};
 use super::bursts::solve_beside_bursts;
 use super::case::{Case, Expectation, WINDOW_STRIDE_S, WINDOWS_MIN};
 use super::error::CaseError;
@@ -238,6 +238,7 @@ impl Live {
         let proof = Proof {
             statistic: log_odds,
             probability: anytime_probability(log_odds),
+            source: Source::Looks,
             claim: self.policy.claim_probability,
             chances: chances_at(self.milestones.searches + 1),
         };

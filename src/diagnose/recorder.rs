@@ -100,29 +100,47 @@ fn principal(errors: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// half a standard deviation.
 const NEGLIGIBLE_NG: f64 = 0.25;
 
-/// A case whose files somebody has by their names; a dump is taken through the pipeline.
+/// A case whose files somebody has by their names, `None` where there is no such file; a dump is taken through the pipeline. `set` are
+/// `key=value` overrides of `case.toml`.
 ///
 /// # Errors
-/// The first file that is missing or wrong; a recording of another kind.
-pub fn case(header: Header, file: impl Fn(&str) -> Option<Vec<u8>>) -> Result<Case, CaseError> {
+/// The first file that is missing, cannot be read or is wrong; a recording of another kind.
+pub fn case(file: impl Fn(&str) -> Result<Option<Vec<u8>>, CaseError>, set: &[String]) -> Result<Case, CaseError> {
+    let named = |name: &str| if name.is_empty() { Ok(None) } else { file(name) };
+    let text = |name: &str| named(name)?.map(|octets| text(name, octets)).transpose();
+    let header = text("case.toml")?.ok_or_else(|| CaseError::Toml("there is none".into()))?;
+    let header = Header::parse(&header, set)?;
     let files = header.files.clone();
-    let named = |name: &str| if name.is_empty() { None } else { file(name) };
-    let text = |name: &str| named(name).and_then(|octets| String::from_utf8(octets).ok());
     let texts = Texts {
         recording: None,
-        simulation: text(&files.simulation),
-        ancillary: text(&files.ancillary),
-        events: text(&files.events),
+        simulation: text(&files.simulation)?,
+        ancillary: text(&files.ancillary)?,
+        events: text(&files.events)?,
     };
     match header.kind.as_str() {
-        "acceleration_csv" => Case::from_texts(header, &Texts { recording: text(&files.recording), ..texts }),
+        "acceleration_csv" => Case::from_texts(header, &Texts { recording: text(&files.recording)?, ..texts }),
         "recorder_dump" => {
-            let dump = named(&files.recording).ok_or(CaseError::MissingFile { file: files.recording })?;
+            let missing = || CaseError::MissingFile { file: files.recording.clone() };
+            let dump = named(&files.recording)?.ok_or_else(missing)?;
             let recording = recorded(&dump, &header);
+            if recording.clock_s.is_empty() {
+                return Err(CaseError::NoWindows { file: files.recording, octets: dump.len() });
+            }
             Case::of(header, recording, &texts)
         }
         _ => Err(CaseError::Kind(header.kind)),
     }
+}
+
+/// The text in the octets of a file.
+///
+/// # Errors
+/// The first octet that is none of a text.
+pub fn text(name: &str, octets: Vec<u8>) -> Result<String, CaseError> {
+    String::from_utf8(octets).map_err(|error| CaseError::Unreadable {
+        file: name.into(),
+        reason: format!("octet {} is no UTF-8 text", error.utf8_error().valid_up_to() + 1),
+    })
 }
 
 /// The windows of a dump.

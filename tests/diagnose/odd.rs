@@ -41,6 +41,20 @@ fn read(files: &Files) -> Result<Case, String> {
     engine::read(&Material::Files(files))
 }
 
+/// The same with a column of the ancillary data, and the two after it, put through a function.
+fn turned(first: &str, how: impl Fn(f64) -> f64) -> Files {
+    with_lines("ancillary.csv", |lines| {
+        let place = lines[0].split(',').position(|name| name == first).unwrap();
+        for line in &mut lines[1..] {
+            let mut cells: Vec<String> = line.split(',').map(str::to_string).collect();
+            for cell in &mut cells[place..place + 3] {
+                *cell = how(cell.parse().unwrap()).to_string();
+            }
+            *line = cells.join(",");
+        }
+    })
+}
+
 /// Whether drag is named, its fraction, and the notes.
 fn drag(files: &Files) -> (f64, f64, Vec<String>) {
     let found = diagnose(&read(files).unwrap(), &Settings::default()).unwrap();
@@ -98,8 +112,69 @@ fn what_nothing_can_be_is_refused_with_its_place() {
             with_lines("case.toml", |lines| lines.retain(|line| !line.starts_with("sensor_offset_m"))),
             "case.toml: `vehicle.sensor_offset_m` must be three finite numbers, found nothing",
         ),
+        (
+            with_lines("case.toml", |lines| {
+                for line in lines.iter_mut().filter(|line| line.starts_with("end_s")) {
+                    *line = "end_s = 10.0".into();
+                }
+            }),
+            "case.toml: `case.end_s` (10 s) must be after `case.start_s` (",
+        ),
+        (turned("wx_rad_s", |rate| 57.3 * rate), "ancillary.csv: `wx_rad_s, wy_rad_s, wz_rad_s` is not how qw, qx, qy"),
+        (turned("qx", |q| -q), "ancillary.csv: `wx_rad_s, wy_rad_s, wz_rad_s` is not how qw, qx, qy, qz change"),
+        (turned("vx_m_s", |v| 0.6 * v), "ancillary.csv: `vx_m_s, vy_m_s, vz_m_s` is not how rx_m, ry_m, rz_m change"),
     ] {
-        let said = read(&files).unwrap_err();
+        let said = read(&files).err().unwrap_or_else(|| panic!("not refused: {sentence}"));
         assert!(said.contains(sentence), "{said}");
     }
+}
+
+#[test]
+fn what_cannot_be_read_is_not_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, octets) in files() {
+        std::fs::write(folder.path().join(name), octets).unwrap();
+    }
+    let read = || engine::read(&Material::Directory(folder.path())).map(|_| ()).unwrap_err();
+    let simulation = folder.path().join("simulation.csv");
+    std::fs::remove_file(&simulation).unwrap();
+    assert_eq!(read(), "simulation.csv: the case names this file, but it is not there");
+    std::fs::create_dir(&simulation).unwrap();
+    assert_eq!(read(), "simulation.csv: it is there and cannot be read: it is not a regular file");
+    std::fs::remove_dir(&simulation).unwrap();
+    std::fs::write(&simulation, b"clock_s,ax_ng\n\xff").unwrap();
+    assert_eq!(read(), "simulation.csv: it is there and cannot be read: octet 15 is no UTF-8 text");
+    std::fs::remove_file(folder.path().join("case.toml")).unwrap();
+    assert!(read().starts_with("case.toml: there is none in "), "{}", read());
+}
+
+#[test]
+fn a_dump_without_a_window_says_so() {
+    let order =
+        Order { kind: Kind::Clean, seed: 1_191_001, only: None, manner: Manner { dump: true, ..Manner::default() } };
+    let mut files = draw_order(&order).files;
+    let (_, dump) = files.iter_mut().find(|(name, _)| name == "recording.dump").unwrap();
+    dump.clear();
+    assert!(
+        read(&files).err().unwrap_or_default().starts_with("recording.dump: no calibrated window is in its 0 octets")
+    );
+}
+
+#[test]
+fn a_log_of_another_clock_and_a_claim_that_does_not_hold_are_told() {
+    let (.., notes) = drag(&with_lines("case.toml", |lines| {
+        for line in lines.iter_mut().filter(|line| line.starts_with("includes")) {
+            *line = "includes = [\"rotation\", \"aerodynamic_drag\"]".into();
+        }
+    }));
+    let of = |word: &str, notes: &[String]| notes.iter().filter(|note| note.contains(word)).count();
+    assert_eq!(of("includes aerodynamic_drag: the recording shows", &notes), 1, "{notes:?}");
+    assert_eq!((of("includes rotation", &notes), of("another clock", &notes)), (0, 0), "{notes:?}");
+    let (.., notes) = drag(&with_lines("events.csv", |lines| {
+        for line in &mut lines[1..] {
+            let (clock_s, rest) = line.split_once(',').unwrap();
+            *line = format!("{},{rest}", 1e9 + clock_s.parse::<f64>().unwrap());
+        }
+    }));
+    assert_eq!(of("another clock", &notes), 1, "{notes:?}");
 }

@@ -1,6 +1,6 @@
 //! Whether the numbers of a case can be in the units they should be in: by the size of the middle one.
 
-use super::{Ancillary, Recording, Simulation, WINDOWS_MIN};
+use super::{Ancillary, Recording, Simulation, WINDOWS_MIN, motion};
 use crate::diagnose::error::CaseError;
 
 /// Nothing on a vehicle in orbit is accelerated by more, ng.
@@ -47,7 +47,8 @@ pub fn ancillary(file: &str, ancillary: &Ancillary) -> Result<(), CaseError> {
     each(file, "vx_m_s, vy_m_s, vz_m_s (norm)", &norm(&ancillary.v_m_s), "m/s", [1e2, 2e4])?;
     each(file, "wx_rad_s, wy_rad_s, wz_rad_s (norm)", &norm(&ancillary.w_rad_s), "rad/s", [0.0, 10.0])?;
     each(file, "density_kg_m3", &ancillary.density_kg_m3, "kg/m3", [0.0, 1e-6])?;
-    each(file, "temperature_c", &ancillary.temperature_c, "C", [-273.15, 2000.0])
+    each(file, "temperature_c", &ancillary.temperature_c, "C", [-273.15, 2000.0])?;
+    motion::agree(file, ancillary)
 }
 
 /// Every value within what there is.

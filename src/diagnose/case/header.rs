@@ -118,14 +118,16 @@ impl Header {
             expected: "a UTC time such as 1994-07-08T12:53:01Z",
             found: epoch,
         })?;
+        let [start_s, end_s] =
+            [number_or(&table, "case.start_s", f64::NEG_INFINITY)?, number_or(&table, "case.end_s", f64::INFINITY)?];
+        if end_s <= start_s {
+            return Err(CaseError::Span { start_s, end_s });
+        }
         Ok(Self {
             id: string(&table, "case.id")?,
             epoch_utc,
             liftoff_clock_s: number_or(&table, "case.liftoff_clock_s", 0.0)?,
-            span_s: [
-                number_or(&table, "case.start_s", f64::NEG_INFINITY)?,
-                number_or(&table, "case.end_s", f64::INFINITY)?,
-            ],
+            span_s: [start_s, end_s],
             vehicle,
             includes: words(&table, "simulation.includes"),
             kind,

@@ -2,6 +2,7 @@
 
 mod check;
 mod header;
+mod motion;
 mod read;
 mod spikes;
 

@@ -167,8 +167,8 @@ pub(super) fn clock(c: &mut Collector) {
     let s = c.scene;
     let [start, end] = s.span_s();
     let t: Vec<f64> = s.clock_s().iter().map(|t| (t - start) / (end - start) * 2.0 - 1.0).collect();
-    c.windows("t^2", "time", "the whole record", t.iter().map(|x| x * x).collect());
-    c.windows("t^3", "time", "the whole record", t.iter().map(|x| x.powi(3)).collect());
+    c.windows("t^2", "time", "the whole record, t from -1 to 1", t.iter().map(|x| x * x).collect());
+    c.windows("t^3", "time", "the whole record, t from -1 to 1", t.iter().map(|x| x.powi(3)).collect());
     for hours in [6.0, 8.0, 12.0, 24.0, 48.0] {
         let rate = std::f64::consts::TAU / (hours * 3600.0);
         c.several(

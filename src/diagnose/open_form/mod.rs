@@ -10,6 +10,8 @@ mod motion;
 mod places;
 mod surroundings;
 
+pub use motion::angles as orbit_angles;
+
 use crate::math::shared_work;
 use crate::physics::Vec3;
 
@@ -28,6 +30,8 @@ pub struct Said {
     pub location: &'static str,
     /// The formula of each form.
     pub formulas: Vec<String>,
+    /// What each part of each form is divided by: its deviation over the record.
+    pub deviations: Vec<Vec<f64>>,
 }
 
 /// A family of forms, weighed together: one form, or the same form at several widths, delays or places.
@@ -74,24 +78,28 @@ impl Collector<'_> {
         location: &'static str,
         members: impl IntoIterator<Item = (String, Vec<f64>)>,
     ) {
-        let (formulas, shapes): (Vec<String>, Vec<Shape>) = members
-            .into_iter()
-            .filter_map(|(formula, series)| standard(&series).map(|series| (formula, Shape::scalar(&series))))
-            .unzip();
+        let mut said = Said { covariate, location, formulas: Vec::new(), deviations: Vec::new() };
+        let mut shapes = Vec::new();
+        for (formula, series) in members {
+            let Some((series, deviation)) = standard(&series) else { continue };
+            said.formulas.push(formula);
+            said.deviations.push(vec![deviation]);
+            shapes.push(Shape::scalar(&series));
+        }
         if !shapes.is_empty() {
-            self.atoms.push(Atom { said: Said { covariate, location, formulas }, shapes });
+            self.atoms.push(Atom { said, shapes });
         }
     }
 
-    /// Columns, a coefficient each.
+    /// Columns, a coefficient each, of parts with these deviations.
     fn columns(
         &mut self,
         formula: impl Into<String>,
         covariate: &'static str,
         location: &'static str,
-        columns: Vec<Raw>,
+        (columns, deviations): (Vec<Raw>, Vec<f64>),
     ) {
-        let said = Said { covariate, location, formulas: vec![formula.into()] };
+        let said = Said { covariate, location, formulas: vec![formula.into()], deviations: vec![deviations] };
         self.atoms.push(Atom { said, shapes: vec![Shape::Columns(columns)] });
     }
 
@@ -103,13 +111,14 @@ impl Collector<'_> {
         location: &'static str,
         parts: &[&dyn Fn(usize) -> f64],
     ) {
-        let series: Vec<Vec<f64>> = parts.iter().filter_map(|f| standard(&self.scene.measure_scalar(f))).collect();
+        let (series, deviations): (Vec<Vec<f64>>, Vec<f64>) =
+            parts.iter().filter_map(|f| standard(&self.scene.measure_scalar(f))).unzip();
         if series.len() == parts.len() {
             let columns: Vec<Raw> = series
                 .iter()
                 .flat_map(|s| (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| s.clone()))))
                 .collect();
-            self.columns(formula, covariate, location, columns);
+            self.columns(formula, covariate, location, (columns, deviations));
         }
     }
 
@@ -121,16 +130,17 @@ impl Collector<'_> {
         location: &'static str,
         parts: &[&dyn Fn(usize) -> Vec3],
     ) {
-        let columns: Vec<Raw> =
-            parts.iter().filter_map(|f| standard_vector(&self.scene.measure(f))).map(|axes| axes.map(Some)).collect();
+        let of_part = |f: &&dyn Fn(usize) -> Vec3| standard_vector(&self.scene.measure(f));
+        let (columns, deviations): (Vec<Raw>, Vec<f64>) =
+            parts.iter().filter_map(of_part).map(|(axes, deviation)| (axes.map(Some), deviation)).unzip();
         if columns.len() == parts.len() {
-            self.columns(formula, covariate, location, columns);
+            self.columns(formula, covariate, location, (columns, deviations));
         }
     }
 }
 
-/// Unit deviation, `None` for what hardly varies.
-fn standard(series: &[f64]) -> Option<Vec<f64>> {
+/// A series of unit deviation and the deviation it had, `None` for what hardly varies.
+fn standard(series: &[f64]) -> Option<(Vec<f64>, f64)> {
     let n = series.len() as f64;
     let mean = series.iter().sum::<f64>() / n;
     let deviation = (series.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
@@ -139,17 +149,17 @@ fn standard(series: &[f64]) -> Option<Vec<f64>> {
     // A form that is zero most of the time keeps its zeros: its support is where it lives.
     let shift = if zero_at_rest { 0.0 } else { mean };
     (deviation.is_finite() && deviation > 1e-9 * largest && deviation > 0.0)
-        .then(|| series.iter().map(|x| (x - shift) / deviation).collect())
+        .then(|| (series.iter().map(|x| (x - shift) / deviation).collect(), deviation))
 }
 
-fn standard_vector(axes: &Axes) -> Option<Axes> {
+fn standard_vector(axes: &Axes) -> Option<(Axes, f64)> {
     let n = axes[0].len() as f64;
     let mean: [f64; 3] = std::array::from_fn(|k| axes[k].iter().sum::<f64>() / n);
     let deviation =
         ((0..3).map(|k| axes[k].iter().map(|x| (x - mean[k]).powi(2)).sum::<f64>()).sum::<f64>() / n).sqrt();
     let largest = axes.iter().flatten().fold(0.0_f64, |m, x| m.max(x.abs()));
     (deviation.is_finite() && deviation > 1e-6 * largest && deviation > 0.0)
-        .then(|| std::array::from_fn(|k| axes[k].iter().map(|x| (x - mean[k]) / deviation).collect()))
+        .then(|| (std::array::from_fn(|k| axes[k].iter().map(|x| (x - mean[k]) / deviation).collect()), deviation))
 }
 
 /// Who fills the dictionary, in the order in which its forms stand.

@@ -31,7 +31,7 @@ pub(super) fn rates(c: &mut Collector) {
 }
 
 /// Angles of the orbit at every grid point: argument of latitude, and the angle past orbital noon.
-pub(super) fn angles(scene: &Scene) -> (Vec<f64>, Vec<f64>) {
+pub fn angles(scene: &Scene) -> (Vec<f64>, Vec<f64>) {
     (0..scene.grid_s.len())
         .map(|g| {
             let normal = scene.r_m[g].cross(&scene.v_m_s[g]).normalize();

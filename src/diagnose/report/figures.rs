@@ -135,7 +135,7 @@ fn log_strip(plates: &Plates, area: &Canvas, time: std::ops::Range<f64>) -> Resu
 
 /// The residual against each covariate, before and after, on the axis that carries most of what is claimed (or is loudest).
 pub fn covariates(plates: &Plates) -> Drawn {
-    let shown: Vec<_> = plates.covariates.iter().filter(|c| c.values.len() == plates.clock_s.len()).take(9).collect();
+    let shown: Vec<_> = plates.covariates.iter().filter(|c| c.values.len() == plates.clock_s.len()).take(12).collect();
     if shown.is_empty() {
         return Ok(String::new());
     }

@@ -73,6 +73,9 @@ const PREDICTED_LEAST: f64 = 0.05;
 fn under(d: &Diagnosis, plates: &Plates) -> String {
     let mut line = format!("Verdict: {}", d.verdict.word());
     let _ = write!(line, " · false-alarm probability {}", probability(d.false_alarm_probability));
+    if let Some(source) = d.false_alarm_from {
+        let _ = write!(line, " ({})", source.words());
+    }
     if let (Some(first), Some(last)) = (plates.clock_s.first(), plates.clock_s.last()) {
         let met = |t: &f64| (t - plates.liftoff_clock_s) / 3600.0;
         let _ =
@@ -147,7 +150,7 @@ fn held_out(page: &mut String, d: &Diagnosis) {
     );
     let claimed = !d.effects.is_empty();
     let removed = if claimed {
-        format!("{:.0} % of the excess over the noise is removed; ", 100.0 * fit.held_out.excess_removed)
+        format!("a fit to the other blocks gives {:.0} % of the effect; ", 100.0 * fit.held_out.excess_removed)
     } else {
         String::new()
     };

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::diagnose::answer::{
-    Alternative, EffectAnswer, Fit, FitLevel, HeldOut, Located, ParameterAnswer, UpperLimit, Verdict,
+    Alternative, EffectAnswer, Fit, FitLevel, HeldOut, Located, ParameterAnswer, Source, UpperLimit, Verdict,
 };
 
 fn diagnosis(verdict: Verdict) -> Diagnosis {
@@ -13,6 +13,7 @@ fn diagnosis(verdict: Verdict) -> Diagnosis {
         case: "a <case>".into(),
         verdict,
         false_alarm_probability: if explained { 1e-4 } else { 0.4 },
+        false_alarm_from: Some(Source::NullTable),
         statistic: Some(40.0),
         slow_evidence: Some(-1.0),
         located: Located { axes: vec!["x".into(), "z".into()], frame: "body".into(), ..Located::default() },

@@ -3,7 +3,7 @@
 //! They are no matter of evidence against noise: the records themselves, their ranges and rails, say so, and the calibration has a
 //! bound of its own for false ones.
 
-use crate::diagnose::answer::{Diagnosis, EffectAnswer, Interval, ParameterAnswer, Verdict};
+use crate::diagnose::answer::{Diagnosis, EffectAnswer, Interval, ParameterAnswer, Source, Verdict};
 use crate::diagnose::case::Fault;
 use crate::diagnose::scene::Scene;
 use crate::pipeline::calibration::{AnomalyKind, FALSE_PER_MISSION};
@@ -37,7 +37,10 @@ pub fn tell(answer: &mut Diagnosis, scene: &Scene) {
             rms_ng: None,
         });
         answer.located.intervals.push(Interval { start_s: from_s, end_s: to_s, why: "fault of the instrument".into() });
-        answer.false_alarm_probability = answer.false_alarm_probability.min(FALSE_PER_MISSION);
+        if FALSE_PER_MISSION < answer.false_alarm_probability {
+            answer.false_alarm_probability = FALSE_PER_MISSION;
+            answer.false_alarm_from = Some(Source::Calibration);
+        }
         if answer.verdict == Verdict::Consistent {
             answer.verdict = Verdict::Explained;
         }

@@ -1,6 +1,7 @@
 //! From weighed hypotheses to what is said: consistent, explained, ambiguous or unexplained, with its figures. It decides; what
 //! it says of a decision is in the files beside it.
 
+mod claims;
 mod credible;
 mod faults;
 mod fit;
@@ -12,6 +13,7 @@ mod nearest;
 mod stands;
 mod unnamed;
 
+use self::claims::of_claims;
 use self::credible::credible;
 use self::fit::fit;
 use self::judge::{Judged, judge};
@@ -20,9 +22,9 @@ use self::named::name;
 use self::nearest::nearest;
 use self::stands::tried;
 use self::unnamed::{hypothesis, of_failure, of_remains};
-use super::answer::{Diagnosis, Interval, Located, Verdict};
+use super::answer::{Diagnosis, Interval, Located, Source, Verdict};
 use super::bursts::OUT;
-use super::case::SPIKE;
+use super::case::{Event, SPIKE};
 use super::catalogue::Effect;
 use super::design::Frame;
 use super::locate;
@@ -44,6 +46,9 @@ const TOLD: f64 = 3.0;
 /// Log evidence lost to noise that is not white, from which on it is told.
 const TOLD_OF_COLOUR: f64 = 1.0;
 
+/// A log all of whose entries are farther from the recording may be of another clock, s.
+const LOG_AWAY_S: f64 = 2.0 * 86_400.0;
+
 /// What proof there is, and what is asked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Proof {
@@ -51,6 +56,8 @@ pub struct Proof {
     pub statistic: f64,
     /// Probability that noise reaches the evidence of this record.
     pub probability: f64,
+    /// What says so.
+    pub source: Source,
     /// Probability of a false alarm at or below which something is claimed.
     pub claim: f64,
     /// What the probability of what remains is multiplied by: 1 for a single look, more where there were looks before.
@@ -113,11 +120,18 @@ fn of_the_mismatch(
     let (verdict, remains) = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
     let tried = judged.on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
     let least = remains.as_ref().map_or(1.0, |r| r.probability);
-    let overall = (proof.probability / EVIDENCE_SHARE).min(least / (1.0 - EVIDENCE_SHARE)).min(1.0);
+    let (of_evidence, by_remains) = (proof.probability / EVIDENCE_SHARE, least / (1.0 - EVIDENCE_SHARE));
+    let overall = of_evidence.min(by_remains).min(1.0);
+    let false_alarm_from = Some(if by_remains < of_evidence { Source::Remains } else { proof.source });
     let statistic = Some(proof.statistic);
     let slow_evidence = Some(solution.null.slow_evidence);
-    let mut answer =
-        Diagnosis { verdict, statistic, slow_evidence, ..Diagnosis::nothing(&scene.case.header.id, overall) };
+    let mut answer = Diagnosis {
+        verdict,
+        false_alarm_from,
+        statistic,
+        slow_evidence,
+        ..Diagnosis::nothing(&scene.case.header.id, overall)
+    };
     answer.located.covariates =
         locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
     let null_frame = solution.null.frame(scene);
@@ -164,6 +178,7 @@ fn of_the_mismatch(
         _ => {
             notes.extend(of_assumptions(scene, library, &best.set));
             name(&mut answer, scene, library, &best, &listed);
+            notes.extend(of_claims(scene, &answer.effects, answer.verdict));
         }
     }
     answer.notes = notes;
@@ -195,6 +210,16 @@ fn of_windows(scene: &Scene) -> Vec<String> {
     if of_spikes > 0 {
         notes.push(format!(
             "{of_spikes} windows are left out: they stand alone, more than {SPIKE} standard deviations from those before and after"
+        ));
+    }
+    let [start_s, end_s] = scene.span_s();
+    let events = &scene.case.events;
+    let far = |e: &Event| e.clock_s > end_s + LOG_AWAY_S || e.clock_s + e.duration_s < start_s - LOG_AWAY_S;
+    if !events.is_empty() && events.iter().all(far) {
+        notes.push(format!(
+            "none of the {} entries of the log is within {} days of the recording: it may be of another clock",
+            events.len(),
+            LOG_AWAY_S / 86_400.0
         ));
     }
     if bursts > 0 {

@@ -6,6 +6,10 @@ use crate::diagnose::remains::Remains;
 use crate::diagnose::search::{Family, Weighed};
 use crate::diagnose::solve::Library;
 
+/// How a formula is evaluated.
+const READ: &str = "To evaluate it: SI units, T in C, m and a_d (simulation and modelled drag) in ng, angles as their sines; each part over its \
+                    deviation in this record, coefficients of x, y, z part by part; a constant per axis is free.";
+
 /// From what remains after the best explanation; `beside` names that.
 pub fn of_remains(r: &Remains, beside: &str) -> Hypothesis {
     Hypothesis {
@@ -51,10 +55,13 @@ pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins
         let Family::Open(form) = library.entries[m.entry].family else { continue };
         let amplitudes: Vec<String> =
             best.fits[i].parameters.iter().map(|p| format!("{:.1}({:.1})", p.value, p.sigma)).collect();
+        let (said, member) = (&library.forms[form], m.theta[0] as usize);
+        let deviations: Vec<String> = said.deviations[member].iter().map(|d| format!("{d:.4e}")).collect();
         formula.push(format!(
-            "[{}] x {}, scaled to unit deviation",
+            "[{}] ng x ({}) / [{}]",
             amplitudes.join(", "),
-            library.forms[form].formulas[m.theta[0] as usize]
+            said.formulas[member],
+            deviations.join(", ")
         ));
         axis.push(m.axis.map_or("x, y, z", |a| ["x", "y", "z"][a]));
         location.push(library.forms[form].location);
@@ -64,6 +71,6 @@ pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins
         formula: formula.join(" + "),
         axis: axis.join("; "),
         unit: "ng".into(),
-        location: format!("It lives in {}.{failing}", location.join(" and ")),
+        location: format!("It lives in {}. {READ}{failing}", location.join(" and ")),
     }
 }
