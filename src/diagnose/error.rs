@@ -178,6 +178,19 @@ pub enum CaseError {
         /// Median size of the difference.
         apart: f64,
     },
+    /// A simulation that leaps from row to row by more than the recording's noise.
+    #[error(
+        "{file}: it changes too fast from row to row to be told from the recording's noise in all but {common} windows, and at \
+         least {needed} are needed: is its grid too coarse, or one of the two in another unit?"
+    )]
+    TooRough {
+        /// File.
+        file: String,
+        /// Windows left.
+        common: usize,
+        /// Windows needed.
+        needed: usize,
+    },
     /// Too little to work with.
     #[error("{file}: {found} rows, and at least {needed} are needed")]
     TooFew {
@@ -232,6 +245,7 @@ impl CaseError {
             | Self::Beyond { file, .. }
             | Self::Frozen { file, .. }
             | Self::TooCoarse { file, .. }
+            | Self::TooRough { file, .. }
             | Self::NoWindows { file, .. }
             | Self::Contradiction { file, .. }
             | Self::TooFew { file, .. }

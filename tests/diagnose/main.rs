@@ -2,6 +2,7 @@
 
 mod bursts;
 mod dump;
+mod formula;
 mod lag;
 mod limits;
 mod odd;

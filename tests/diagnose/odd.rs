@@ -178,3 +178,16 @@ fn a_log_of_another_clock_and_a_claim_that_does_not_hold_are_told() {
     }));
     assert_eq!(of("another clock", &notes), 1, "{notes:?}");
 }
+
+#[test]
+fn a_recording_in_another_unit_is_told() {
+    let in_ug = with_lines("recording.csv", |lines| {
+        for line in &mut lines[1..] {
+            let (clock_s, rest) = line.split_once(',').unwrap();
+            let cells = rest.split(',').map(|cell| format!("{:.6}", cell.parse::<f64>().unwrap() / 1000.0));
+            *line = format!("{clock_s},{}", cells.collect::<Vec<String>>().join(","));
+        }
+    });
+    let said = read(&in_ug).err().unwrap_or_default();
+    assert!(said.starts_with("simulation.csv: ") && said.ends_with("or one of the two in another unit?"), "{said}");
+}

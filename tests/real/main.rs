@@ -41,3 +41,15 @@ fn diagnose(folder: &str, overrides: &[&str]) -> Option<Answer> {
 fn ids(answer: &Answer) -> Vec<&str> {
     answer.effects.iter().map(|e| e.id.as_str()).collect()
 }
+
+/// What is left of a least-squares fit is square to what an effect takes away: the squares of the contributions add up to the fall.
+fn contributions_add_up(answer: &Answer, within: f64) {
+    let mut claimed = 0;
+    for arc in answer.arcs.iter().filter(|arc| !arc.effects.is_empty()) {
+        let fall = arc.rms_before.powi(2) - arc.rms_after.powi(2);
+        let of_effects: f64 = arc.effects.iter().map(|e| e.rms[0].powi(2)).sum();
+        assert!((of_effects / fall - 1.0).abs() < within, "{}: {of_effects} of {fall}", arc.id);
+        claimed += 1;
+    }
+    assert!(claimed > 0);
+}

@@ -3,7 +3,7 @@
 
 use oare_ground::diagnose::answer::Verdict;
 
-use super::{diagnose, ids};
+use super::{contributions_add_up, diagnose, ids};
 
 /// Three satellites of three planes, for the fast tests.
 const FEW: &str = "recording.satellites=[\"G05\",\"G13\",\"G24\"]";
@@ -19,6 +19,7 @@ fn sunlight_is_named_first_and_the_rest_of_radiation_after_it() {
     let Some(answer) = diagnose("gps-orbits-2010", &[FEW]) else { return };
     assert_eq!((answer.verdict, ids(&answer)), (Verdict::Explained, RADIATION.to_vec()));
     assert!(answer.fit.after.rms_total < 0.06, "{}", answer.fit.after.rms_total);
+    contributions_add_up(&answer, 0.01);
     for arc in &answer.arcs {
         let push = &arc.effects[0].parameters[0];
         assert!((8.3e-8..1.05e-7).contains(&push.value), "{} {push:?}", arc.id);

@@ -2,7 +2,7 @@
 
 use oare_ground::diagnose::answer::Verdict;
 
-use super::{diagnose, ids};
+use super::{contributions_add_up, diagnose, ids};
 
 #[test]
 fn a_triad_gives_its_bias_angles_and_scales() {
@@ -11,6 +11,7 @@ fn a_triad_gives_its_bias_angles_and_scales() {
     // Published: 0.037 with bias and one scale, 0.00098 with everything.
     let rms: Vec<f64> = answer.steps.iter().map(|s| s.rms).collect();
     assert!((rms[1] - 0.037).abs() < 0.001 && rms[3] < 0.001, "{rms:?}");
+    contributions_add_up(&answer, 0.01);
     assert!(answer.fit.held_out.as_ref().is_some_and(|h| h.after_rms[0] < 0.01 * h.before_rms[0]));
 }
 
@@ -23,6 +24,7 @@ fn the_bias_follows_temperature_and_the_gyro_does_not() {
             println!("   {} {:?} {}", e.id, e.parameters, e.why);
         }
     }
+    contributions_add_up(&answer, 0.01);
     // Published slopes, mg/C.
     for (column, slope) in [("accel_x", 0.57e-3), ("accel_y", 0.41e-3), ("accel_z", -0.41e-3)] {
         let arc = answer.arcs.iter().find(|a| a.id == column).expect("an axis");

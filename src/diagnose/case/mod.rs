@@ -256,7 +256,10 @@ impl Case {
         }
         let windows_in_holes = before - kept.clock_s.len();
         kept = smooth_enough(&kept, &expected.simulation);
-        coarse(&files.simulation, &kept)?;
+        let common = kept.clock_s.len();
+        if common < WINDOWS_MIN {
+            return Err(CaseError::TooRough { file: files.simulation.clone(), common, needed: WINDOWS_MIN });
+        }
         let windows_too_rough = before - windows_in_holes - kept.clock_s.len();
         let before = kept.clock_s.len();
         let alike = spikes::without(&kept);

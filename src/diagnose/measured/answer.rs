@@ -61,7 +61,7 @@ pub struct Effect {
     pub from_degree: Option<usize>,
     /// One or two sentences that can be checked.
     pub why: String,
-    /// RMS of what is left once this effect and those before it are in the model.
+    /// RMS of its contribution: by what it changes the residual when it joins those before it, everything else fitted anew.
     pub rms: Vec<f64>,
 }
 

@@ -1,5 +1,7 @@
 //! The search's outcome in words and figures: a verdict for all arcs and one for each.
 
+use nalgebra::Vector3;
+
 use super::arc::{Arc, ArcFit};
 use super::forces::Term;
 use super::manoeuvre::Manoeuvre;
@@ -125,7 +127,8 @@ fn manoeuvre_effect(problem: &Problem, one: &Manoeuvre, of_many: bool) -> Effect
         axis: None,
         from_degree: None,
         why,
-        rms: vec![one.rms_m[1]],
+        // Of a least-squares fit: what is left is square to what is taken away.
+        rms: vec![(one.rms_m[0].powi(2) - one.rms_m[1].powi(2)).max(0.0).sqrt()],
     }
 }
 
@@ -150,7 +153,7 @@ fn common_effects(problem: &Problem, search: &Search, table: &Table) -> Vec<Effe
         if n > 1 && !term.is_known_size() {
             why.push_str(" One value per satellite, in `arcs`; the figure here is their median.");
         }
-        effect(*term, *score, with_degree(*term, parameters), why, axis_rms(problem, after))
+        effect(*term, *score, with_degree(*term, parameters), why, change_rms(problem, before, after))
     };
     table.iter().enumerate().map(one).collect()
 }
@@ -189,7 +192,9 @@ fn arc_answer(problem: &Problem, search: &Search, table: &Table, i: usize) -> Ar
         let (before, after) = (&search.levels[step].fits[i], &search.levels[step + 1].fits[i]);
         let (was, is) = (before.rms_m(0..arc.fitted), after.rms_m(0..arc.fitted));
         let why = format!("3-D residual of this arc from {was:.3} m to {is:.3} m.");
-        effects.push(effect(*term, evidence(arc, before, *term), parameters, why, vec![is]));
+        let change = |k: usize| (before.residuals_m[k] - after.residuals_m[k]).norm_squared();
+        let rms = ((0..arc.fitted).map(change).sum::<f64>() / arc.fitted as f64).sqrt();
+        effects.push(effect(*term, evidence(arc, before, *term), parameters, why, vec![rms]));
     }
     effects
         .extend(search.manoeuvres.iter().filter(|one| one.arc == i).map(|one| manoeuvre_effect(problem, one, false)));
@@ -232,19 +237,27 @@ fn arc_answer(problem: &Problem, search: &Search, table: &Table, i: usize) -> Ar
 
 /// Median over arcs of the rms along radius, track and normal, m.
 fn axis_rms(problem: &Problem, level: &Level) -> Vec<f64> {
-    let one = |(arc, fit): (&Arc, &ArcFit)| rtn_rms(arc, fit);
+    let one = |(arc, fit): (&Arc, &ArcFit)| rtn_rms(arc, |i| fit.residuals_m[i]);
     let each: Vec<[f64; 3]> = problem.arcs.iter().zip(&level.fits).map(one).collect();
     (0..3).map(|k| median(each.iter().map(|rms| rms[k]))).collect()
 }
 
-fn rtn_rms(arc: &Arc, fit: &ArcFit) -> [f64; 3] {
+/// The same of what changes from one level to another.
+fn change_rms(problem: &Problem, before: &Level, after: &Level) -> Vec<f64> {
+    let fits = before.fits.iter().zip(&after.fits);
+    let one = |(arc, (was, is)): (&Arc, (&ArcFit, &ArcFit))| rtn_rms(arc, |i| was.residuals_m[i] - is.residuals_m[i]);
+    let each: Vec<[f64; 3]> = problem.arcs.iter().zip(fits).map(one).collect();
+    (0..3).map(|k| median(each.iter().map(|rms| rms[k]))).collect()
+}
+
+fn rtn_rms(arc: &Arc, of: impl Fn(usize) -> Vector3<f64>) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for i in 0..arc.fitted {
         let next = if i + 1 < arc.t_s.len() { i + 1 } else { i - 1 };
         let radial = arc.observed_m[i].normalize();
         let ahead = (arc.observed_m[next] - arc.observed_m[i]) * if next > i { 1.0 } else { -1.0 };
         let normal = radial.cross(&ahead).normalize();
-        let r = &fit.residuals_m[i];
+        let r = of(i);
         for (sum, axis) in sum.iter_mut().zip([radial, normal.cross(&radial), normal]) {
             *sum += r.dot(&axis).powi(2);
         }

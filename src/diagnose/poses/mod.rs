@@ -101,6 +101,11 @@ impl Triad {
         rms(&self.residuals)
     }
 
+    /// Rms of what the fit of another model changes, m/s^2.
+    fn rms_from(&self, other: &Self) -> f64 {
+        rms(&self.residuals.iter().zip(&other.residuals).map(|(a, b)| a - b).collect::<Vec<f64>>())
+    }
+
     /// Value and standard error of a part's three numbers.
     pub fn values(&self, part: Part) -> [(f64, f64); 3] {
         let Some(at) = place(&self.parts, part) else { return [(0.0, 0.0); 3] };
@@ -388,7 +393,7 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
     let mut effects = Vec::new();
     for (i, (part, score)) in found.added.iter().enumerate() {
         let mut one = effect(case, last, *part, *score, found.fits[i].rms());
-        one.rms = vec![found.fits[i + 1].rms()];
+        one.rms = vec![found.fits[i].rms_from(&found.fits[i + 1])];
         effects.push(one);
     }
     let step = |(i, fit): (usize, &Triad)| StepAnswer {

@@ -68,7 +68,8 @@ impl Row<'_> {
             let (id, name) = (follows.id().to_owned(), follows.name().to_owned());
             let axis = matches!(follows, Follows::Scale).then(|| self.axis.name.clone());
             let parameters = self.parameters(i, *follows);
-            Effect { id, name, posterior: posterior(*score), parameters, axis, from_degree: None, why, rms: vec![is] }
+            let rms = vec![self.found.fits[i].rms_from(&self.found.fits[i + 1])];
+            Effect { id, name, posterior: posterior(*score), parameters, axis, from_degree: None, why, rms }
         };
         self.found.effects.iter().enumerate().map(one).collect()
     }

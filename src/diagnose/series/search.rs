@@ -44,6 +44,11 @@ impl Regression {
     pub fn rms(&self) -> f64 {
         rms(&self.residuals)
     }
+
+    /// Rms of what another fit of the same axis changes.
+    pub fn rms_from(&self, other: &Self) -> f64 {
+        rms(&self.residuals.iter().zip(&other.residuals).map(|(a, b)| a - b).collect::<Vec<f64>>())
+    }
 }
 
 /// Fit a constant per span and the effects, with errors that hold in red noise.
