@@ -1,8 +1,9 @@
 //! The project's own analyser as the one under test: it gets files through the real reader, or a directory, and nothing else.
 
+use super::folder;
 use super::run::{Analyser, Material};
 use crate::diagnose::case::Case;
-use crate::diagnose::{Settings, analyse, folder, recorder};
+use crate::diagnose::{Settings, analyse, recorder};
 
 /// The analyser with its settings.
 #[derive(Debug, Clone, Default)]

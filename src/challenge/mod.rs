@@ -2,6 +2,7 @@
 
 pub mod conceal;
 pub mod engine;
+pub mod folder;
 pub mod real;
 pub mod run;
 pub mod score;

@@ -5,12 +5,13 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
+use oare_ground::challenge::folder;
 use oare_ground::diagnose::analysis::{Analysis, Prepared, Settings};
 use oare_ground::diagnose::answer::Diagnosis;
 use oare_ground::diagnose::catalogue;
 use oare_ground::diagnose::error::CaseError;
 use oare_ground::diagnose::measured::{self, MeasuredCase};
-use oare_ground::diagnose::{folder, report};
+use oare_ground::diagnose::report;
 
 use super::output::{write, write_report};
 

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 
 use super::Fault;
 use super::section::Section;
+use crate::challenge::folder;
 use crate::diagnose::case::{Expectation, Header, Texts};
 use crate::diagnose::catalogue;
 use crate::diagnose::error::CaseError;
 use crate::diagnose::live::Policy;
-use crate::diagnose::{folder, recorder};
+use crate::diagnose::recorder;
 use crate::units::MissionTime;
 
 /// Which files, and how often.

@@ -14,7 +14,6 @@ pub mod catalogue;
 pub mod design;
 mod earlier;
 pub mod error;
-pub mod folder;
 pub mod live;
 pub mod locate;
 pub mod measure;

@@ -1,10 +1,10 @@
-//! The files of a case, in a directory: the one place of this room that opens any.
+//! The files of a case, in a directory: the analyser itself opens none.
 
 use std::path::Path;
 
-use super::case::Case;
-use super::error::CaseError;
-use super::recorder;
+use crate::diagnose::case::Case;
+use crate::diagnose::error::CaseError;
+use crate::diagnose::recorder;
 
 /// Reads a case directory; `set` are `key=value` overrides of `case.toml`.
 ///
