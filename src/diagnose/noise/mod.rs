@@ -84,6 +84,9 @@ impl<'a> Stretch<'a> {
 
 /// Window length, s: two windows closer than this share samples.
 const WINDOW_S: f64 = 50.0;
+/// Most that a window shares with the one before: with more it would share with the second before as well, and no moving average of
+/// two has such a correlation.
+const SHARED_MAX: f64 = 0.5;
 
 impl Schedule {
     /// From window centres.
@@ -94,7 +97,7 @@ impl Schedule {
         let overlap = step_s
             .iter()
             .map(|step| {
-                let shared = (1.0 - step / WINDOW_S).max(0.0);
+                let shared = (1.0 - step / WINDOW_S).clamp(0.0, SHARED_MAX);
                 let previous = (shared / own).min(0.999);
                 own = (1.0 - previous * previous).sqrt();
                 [own, previous]
@@ -316,6 +319,28 @@ mod tests {
         for lag in 1..5 {
             let r = w.iter().zip(&w[lag..]).map(|(a, b)| a * b).sum::<f64>() / n;
             assert!(r.abs() < 5.0 / n.sqrt(), "lag {lag}: {r}");
+        }
+    }
+
+    /// Windows that are means of the same white samples, 2 s early or late as it happens.
+    #[test]
+    fn windows_at_uneven_steps_are_whitened_as_their_samples_overlap() {
+        let mut normal = normals(7);
+        let samples: Vec<f64> = (0..501_000).map(|_| normal()).collect();
+        let centres: Vec<usize> =
+            (0..4000).map(|i| (30 + 25 * i) * 5 + ((normal() + 6.0) * 1e6) as usize % 21).collect();
+        let x: Vec<f64> =
+            centres.iter().map(|c| samples[c - 125..c + 125].iter().sum::<f64>() / 250.0_f64.sqrt()).collect();
+        let schedule = Schedule::new(&centres.iter().map(|c| *c as f64 / 5.0).collect::<Vec<f64>>());
+        let noise = AxisNoise { white_ng: 1.0, short_ng: 1e-3, short_tau_s: 100.0, slow_ng: 1e-6, slow_tau_s: 3000.0 };
+        let loudness = Loudness::even(vec![1.0; schedule.len()]);
+        let w = Whitener::new(&noise, &schedule, &loudness).whiten(&x);
+        let n = w.len() as f64;
+        let variance = dot(&w, &w) / n;
+        assert!((variance - 1.0).abs() < 0.1, "{variance}");
+        for lag in 1..5 {
+            let r = w.iter().zip(&w[lag..]).map(|(a, b)| a * b).sum::<f64>() / n;
+            assert!(r.abs() < 0.1, "lag {lag}: {r}");
         }
     }
 
