@@ -181,13 +181,19 @@ fn a_log_of_another_clock_and_a_claim_that_does_not_hold_are_told() {
 
 #[test]
 fn a_recording_in_another_unit_is_told() {
-    let in_ug = with_lines("recording.csv", |lines| {
-        for line in &mut lines[1..] {
-            let (clock_s, rest) = line.split_once(',').unwrap();
-            let cells = rest.split(',').map(|cell| format!("{:.6}", cell.parse::<f64>().unwrap() / 1000.0));
-            *line = format!("{clock_s},{}", cells.collect::<Vec<String>>().join(","));
-        }
-    });
-    let said = read(&in_ug).err().unwrap_or_default();
+    let times = |factor: f64| {
+        with_lines("recording.csv", |lines| {
+            for line in &mut lines[1..] {
+                let (clock_s, rest) = line.split_once(',').unwrap();
+                let cells = rest.split(',').map(|cell| format!("{:.6}", cell.parse::<f64>().unwrap() * factor));
+                *line = format!("{clock_s},{}", cells.collect::<Vec<String>>().join(","));
+            }
+        })
+    };
+    let said = read(&times(1e-3)).err().unwrap_or_default();
     assert!(said.starts_with("simulation.csv: ") && said.ends_with("or one of the two in another unit?"), "{said}");
+    let notes = |factor| diagnose(&read(&times(factor)).unwrap(), &Settings::default()).unwrap().notes;
+    let tells = |notes: &[String]| notes.iter().any(|note| note.ends_with("is one of the two in another unit?"));
+    let [ours, far] = [1.0, 1e3].map(notes);
+    assert!(!tells(&ours) && tells(&far), "{ours:?} {far:?}");
 }

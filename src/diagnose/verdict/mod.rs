@@ -10,6 +10,7 @@ mod judge;
 mod limits;
 mod named;
 mod nearest;
+mod proportion;
 mod stands;
 mod unnamed;
 
@@ -20,6 +21,7 @@ use self::judge::{Judged, judge};
 use self::limits::upper_limits;
 use self::named::name;
 use self::nearest::nearest;
+use self::proportion::of_proportion;
 use self::stands::tried;
 use self::unnamed::{hypothesis, of_failure, of_remains};
 use super::answer::{Diagnosis, Interval, Located, Source, Verdict};
@@ -111,6 +113,7 @@ fn of_the_mismatch(
     proof: Proof,
 ) -> (Diagnosis, Axes, Vec<(String, f64)>) {
     let mut notes = of_windows(scene);
+    notes.extend(of_proportion(scene));
     notes.extend(of_colour(solution.statistic() - proof.statistic));
     let listed = credible(scene, library, &solution.listed, &mut notes);
     let judged = judge(scene, library, solution, &listed, proof);
