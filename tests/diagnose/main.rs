@@ -9,6 +9,7 @@ mod odd;
 mod separating;
 mod smooth;
 mod trial;
+mod unlogged;
 mod wind;
 
 use std::path::PathBuf;

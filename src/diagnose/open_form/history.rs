@@ -99,12 +99,7 @@ pub(super) fn events(c: &mut Collector) {
         }
         echoes(c, kind, &ends);
         for (what, list) in [("start", &starts), ("end", &ends)] {
-            c.windows(
-                format!("time since {what} of {kind}"),
-                "time_since_event",
-                "between logged events",
-                ramp(s.clock_s(), list),
-            );
+            c.family("time_since_event", "between logged events", ramps(s, kind, what, list));
         }
         let count: Vec<f64> = s.clock_s().iter().map(|t| starts.iter().filter(|x| x.0 <= *t).count() as f64).collect();
         c.windows(format!("number of {kind} so far"), "time_since_event", "after logged events", count);
@@ -151,15 +146,30 @@ fn echoes(c: &mut Collector, kind: &str, ends: &[(f64, f64)]) {
     c.family("time_since_event", "some time after logged events", members);
 }
 
-/// Time since the last of the instants, days; before the first as if one had been a day before it.
-fn ramp(clock_s: &[f64], instants: &[(f64, f64)]) -> Vec<f64> {
-    let first = instants.first().map_or(0.0, |x| x.0) - 86_400.0;
+/// Time since the last of the entries. Of the one before the record nothing is logged: where the first entry comes late, it may have
+/// been anywhere in the day before.
+fn ramps(s: &Scene, kind: &str, what: &str, instants: &[(f64, f64)]) -> Vec<(String, Vec<f64>)> {
+    const DAY_S: f64 = 86_400.0;
+    const LATE_S: f64 = 3600.0;
+    let Some(first) = instants.first().map(|x| x.0) else { return Vec::new() };
+    let earliest = (first - s.span_s()[0]).max(0.0);
+    let earlier: &[f64] = if earliest > LATE_S { &[1.0, 0.875, 0.75, 0.625, 0.5] } else { &[1.0] };
+    earlier
+        .iter()
+        .filter(|days| **days == 1.0 || **days * DAY_S > earliest)
+        .map(|days| {
+            let unlogged =
+                if *days < 1.0 { format!(", one {:.0} h before the first", 24.0 * days) } else { String::new() };
+            (format!("time since {what} of {kind}{unlogged}"), ramp(s.clock_s(), instants, first - days * DAY_S))
+        })
+        .collect()
+}
+
+/// Time since the last of the instants, days, and since `before` ahead of the first.
+fn ramp(clock_s: &[f64], instants: &[(f64, f64)], before: f64) -> Vec<f64> {
     clock_s
         .iter()
-        .map(|t| {
-            let last = instants.iter().map(|x| x.0).filter(|x| x <= t).fold(first, f64::max);
-            (t - last) / 86_400.0
-        })
+        .map(|t| (t - instants.iter().map(|x| x.0).filter(|x| x <= t).fold(before, f64::max)) / 86_400.0)
         .collect()
 }
 
