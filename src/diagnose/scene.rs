@@ -13,7 +13,7 @@ use super::case::{Case, Expectation, HALF_WINDOW_S, Header};
 use super::earlier;
 use super::error::CaseError;
 use super::measure::{Measurement, coverage};
-use super::noise::{Loudness, Schedule};
+use super::noise::{self, Contradicted, Loudness, Schedule};
 
 /// One series per body axis.
 pub type Axes = [Vec<f64>; 3];
@@ -66,6 +66,8 @@ pub struct Scene<'a> {
     pub schedule: Schedule,
     /// How loud each window is, per axis.
     pub loudness: [Loudness; 3],
+    /// Where the windows contradict what the deviations say of that.
+    pub contradicted: [Option<Contradicted>; 3],
     /// Recording less measured simulation, ng.
     pub residual_ng: Axes,
     /// The measured simulation, ng.
@@ -201,12 +203,16 @@ impl<'a> Scene<'a> {
         let windows = &case.recording.clock_s;
         let to_windows = Measurement::new(&case.simulation.clock_s, windows);
         let simulated_ng = case.simulation.a_ng.each_ref().map(|series| to_windows.apply(series));
-        let residual_ng =
+        let residual_ng: Axes =
             std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
-        let asleep: Vec<bool> = coverage(windows, &case.spans("crew_sleep")).iter().map(|c| *c > 0.5).collect();
+        let sleeps: Vec<bool> = coverage(windows, &case.spans("crew_sleep")).iter().map(|c| *c > 0.5).collect();
+        let schedule = Schedule::new(windows).with_shared(case.recording.bias_errors_ng.clone());
+        let [dev_ng, residuals_ng] = [&case.recording.dev_ng, &residual_ng].map(|axes| axes.each_ref().map(|x| &x[..]));
+        let (loudness, contradicted) = noise::settled(dev_ng, &sleeps, residuals_ng, &schedule);
         Self {
-            schedule: Schedule::new(windows).with_shared(case.recording.bias_errors_ng.clone()),
-            loudness: std::array::from_fn(|k| Loudness::of_crew(&case.recording.dev_ng[k], &asleep)),
+            schedule,
+            loudness,
+            contradicted,
             residual_ng,
             simulated_ng,
             measurement: Measurement::new(&surroundings.grid_s, windows),

@@ -16,9 +16,11 @@ impl Loudness {
         Self { burst: vec![1.0; activity.len()], activity }
     }
 
-    /// From the average deviation and the crew's sleep.
-    pub fn of_crew(dev_ng: &[f64], asleep: &[bool]) -> Self {
-        Self::even(activity(dev_ng, asleep))
+    /// From the crew's sleep: so loud awake, and so loud asleep.
+    pub fn of_crew([awake, asleep]: [f64; 2], sleeps: &[bool]) -> Self {
+        let raw: Vec<f64> = sleeps.iter().map(|sleeps| if *sleeps { asleep } else { awake }).collect();
+        let rms = (raw.iter().map(|x| x * x).sum::<f64>() / raw.len().max(1) as f64).sqrt();
+        Self::even(raw.iter().map(|x| x / rms).collect())
     }
 
     /// Some of the windows.
@@ -26,23 +28,4 @@ impl Loudness {
         let of = |series: &[f64]| index.iter().map(|i| series[*i]).collect();
         Self { activity: of(&self.activity), burst: of(&self.burst) }
     }
-}
-
-/// Activity of every window, from the average deviation in sleep and wake; mean square 1.
-fn activity(dev_ng: &[f64], asleep: &[bool]) -> Vec<f64> {
-    let mean = |state: bool| {
-        let (sum, n) = dev_ng
-            .iter()
-            .zip(asleep)
-            .filter(|(_, a)| **a == state)
-            .fold((0.0, 0usize), |(s, n), (d, _)| (s + d, n + 1));
-        (n >= 30).then(|| sum / n as f64)
-    };
-    let level = match (mean(false), mean(true)) {
-        (Some(wake), Some(sleep)) if wake > 0.0 && sleep > 0.0 => [wake, sleep],
-        _ => [1.0, 1.0],
-    };
-    let raw: Vec<f64> = asleep.iter().map(|a| level[usize::from(*a)]).collect();
-    let rms = (raw.iter().map(|x| x * x).sum::<f64>() / raw.len().max(1) as f64).sqrt();
-    raw.iter().map(|x| x / rms).collect()
 }

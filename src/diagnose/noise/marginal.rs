@@ -1,5 +1,7 @@
 //! The slow part of the noise, marginalised: what a residual gains by slow noise, and what it costs to have chosen it.
 
+use std::iter::successors;
+
 use super::filter::{Products, Series, products};
 use super::{AxisNoise, Loudness, Schedule};
 use crate::math::shared_work;
@@ -8,10 +10,56 @@ use crate::math::shared_work;
 /// an axis of logarithms.
 pub(super) const SLOW_AMPLITUDES_NG: [f64; 12] = [0.35, 0.7, 1.4, 2.8, 5.6, 8.0, 11.2, 16.0, 22.4, 32.0, 45.0, 64.0];
 pub(super) const SLOW_TIMES_S: [f64; 6] = [300.0, 615.0, 1260.0, 2570.0, 5270.0, 10_800.0];
+/// Times beyond them.
+const BEYOND_S: [f64; 2] = [146.0, 22_100.0];
+/// Louder slow noise than this, ng, has amplitudes and times about its own, which are known better than by a step of these.
+const LOUD_NG: f64 = 45.0;
+/// Those amplitudes reach so many times beyond that fitted, by steps of the root of two.
+const REACH: f64 = 3.0;
+/// Amplitudes reach down to this share of the white noise: less cannot be told from none.
+const UNSEEN: f64 = 0.02;
 /// The trial of hardly any slow noise: the smallest amplitude, of a time in the middle.
 const LEAST: usize = 4;
 /// Noises weighed side by side.
 const LANES: usize = 4;
+
+/// Amplitudes over which the slow part of a noise is marginalised, ng: most noises need no others than those above.
+fn amplitudes_ng(fitted: &AxisNoise) -> Vec<f64> {
+    let step = std::f64::consts::SQRT_2;
+    let [least, most] = [SLOW_AMPLITUDES_NG[0], SLOW_AMPLITUDES_NG[SLOW_AMPLITUDES_NG.len() - 1]];
+    let below = successors(Some(least / step), |a| Some(a / step)).take_while(|a| *a > UNSEEN * fitted.white_ng);
+    let mut all: Vec<f64> = below.collect();
+    all.reverse();
+    all.extend(SLOW_AMPLITUDES_NG);
+    if fitted.slow_ng > LOUD_NG {
+        all.extend(successors(Some(most * step), |a| Some(a * step)).take_while(|a| *a < REACH * fitted.slow_ng));
+        through(&mut all, fitted.slow_ng);
+    }
+    all
+}
+
+/// Its correlation times, s: with that beyond the shortest or the longest where the fitted one is nearer to it.
+fn times_s(fitted: &AxisNoise) -> Vec<f64> {
+    let mut all = SLOW_TIMES_S.to_vec();
+    let [shorter, longer] = BEYOND_S;
+    if fitted.slow_tau_s < (shorter * SLOW_TIMES_S[0]).sqrt() {
+        all.push(shorter);
+    }
+    if fitted.slow_tau_s > (longer * SLOW_TIMES_S[SLOW_TIMES_S.len() - 1]).sqrt() {
+        all.push(longer);
+    }
+    if fitted.slow_ng > LOUD_NG {
+        through(&mut all, fitted.slow_tau_s);
+    }
+    all
+}
+
+/// Moves values by the ratio that puts the nearest of them at another.
+fn through(values: &mut [f64], at: f64) {
+    let ratios = values.iter().map(|value| at / value);
+    let ratio = ratios.min_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs())).unwrap_or(1.0);
+    values.iter_mut().for_each(|value| *value *= ratio);
+}
 
 /// The slow part of the noise of all axes, marginalised.
 #[derive(Debug, Clone, Copy)]
@@ -33,17 +81,22 @@ pub fn slow_part_marginalised(
     schedule: &Schedule,
     loudness: &[Loudness; 3],
 ) -> SlowPart {
+    // The fitted noise of an axis, then those that share the amplitudes and times.
     let mut trials: Vec<(usize, AxisNoise, f64)> = Vec::new();
+    let mut first = [0; 4];
     for (k, noise) in noise.iter().enumerate() {
         trials.push((k, *noise, f64::NAN));
-        for (a, slow_ng) in SLOW_AMPLITUDES_NG.into_iter().enumerate() {
-            let [before, after] = [a.saturating_sub(1), (a + 1).min(SLOW_AMPLITUDES_NG.len() - 1)];
-            let share = 0.5 * (SLOW_AMPLITUDES_NG[after] / SLOW_AMPLITUDES_NG[before]).ln();
-            for slow_tau_s in SLOW_TIMES_S {
-                trials.push((k, AxisNoise { slow_ng, slow_tau_s, ..*noise }, share));
-            }
+        let (amplitudes_ng, times_s) = (amplitudes_ng(noise), times_s(noise));
+        for (a, slow_ng) in amplitudes_ng.iter().enumerate() {
+            let [before, after] = [a.saturating_sub(1), (a + 1).min(amplitudes_ng.len() - 1)];
+            let share = 0.5 * (amplitudes_ng[after] / amplitudes_ng[before]).ln();
+            trials.extend(
+                times_s.iter().map(|tau_s| (k, AxisNoise { slow_ng: *slow_ng, slow_tau_s: *tau_s, ..*noise }, share)),
+            );
         }
+        first[k + 1] = trials.len();
     }
+    // Noises that need other amplitudes and times have them at the same density.
     let whole = (SLOW_AMPLITUDES_NG[11] / SLOW_AMPLITUDES_NG[0]).ln() * SLOW_TIMES_S.len() as f64;
     let groups: Vec<&[(usize, AxisNoise, f64)]> = trials.chunks(LANES).collect();
     let weighed = |group: &&[(usize, AxisNoise, f64)]| {
@@ -54,10 +107,9 @@ pub fn slow_part_marginalised(
         found.iter().take(group.len()).map(likelihood).collect::<Vec<f64>>()
     };
     let likelihoods: Vec<f64> = shared_work::map(&groups, weighed).into_iter().flatten().collect();
-    let per_axis = trials.len() / 3;
-    let axes = trials.chunks(per_axis).zip(likelihoods.chunks(per_axis));
     let mut all = SlowPart { above_fit: 0.0, above_none: 0.0 };
-    for (trials, likelihoods) in axes {
+    for axis in first.windows(2).map(|ends| ends[0]..ends[1]) {
+        let (trials, likelihoods) = (&trials[axis.clone()], &likelihoods[axis]);
         let at_fit = likelihoods[0];
         let weighed = trials[1..].iter().zip(&likelihoods[1..]).map(|(t, l)| t.2 / whole * (l - at_fit).exp());
         let above_fit = weighed.sum::<f64>().max(1e-300).ln();
@@ -92,5 +144,26 @@ mod tests {
         let (none, loud) = (marginal(0.0, 1.0), marginal(30.0, 30.0));
         // A third of the amplitudes, each axis: at least ln 1/4 a piece; of thirty nanograms a few cells of seventy-two.
         assert!(none > 3.0 * 0.25_f64.ln() && loud < none - 2.0, "{none} {loud}");
+    }
+
+    /// Slow noise of any size has amplitudes and times about it: one cell of seventy-two or so costs 4.3 an axis, and no more is paid.
+    #[test]
+    fn slow_noise_of_any_size_is_marginalised_over_its_own_amplitudes() {
+        let schedule = Schedule::new(&(0..3000).map(|i| 25.0 * f64::from(i)).collect::<Vec<f64>>());
+        let loudness = std::array::from_fn(|_| Loudness::even(vec![1.0; schedule.len()]));
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        for scale in [0.02_f64, 1.0, 8.0, 40.0] {
+            let noise = AxisNoise {
+                white_ng: 60.0 * scale.min(1.0),
+                short_ng: 10.0 * scale.min(1.0),
+                short_tau_s: 100.0,
+                slow_ng: 30.0 * scale,
+                slow_tau_s: 3000.0,
+            };
+            let residual =
+                std::array::from_fn(|_| simulate(&noise, &schedule, &loudness[0], || StandardNormal.sample(&mut rng)));
+            let slow = slow_part_marginalised(&[noise; 3], &residual, &schedule, &loudness);
+            assert!((-14.0..0.0).contains(&slow.above_fit) && slow.above_none > 10.0, "{scale}: {slow:?}");
+        }
     }
 }

@@ -11,12 +11,14 @@
 
 mod binned;
 mod filter;
+mod levels;
 mod loudness;
 mod marginal;
 
 pub use binned::{BIN_S, Binned};
 pub use filter::Whitener;
 use filter::{Series, products};
+pub use levels::{Contradicted, settled};
 pub use loudness::Loudness;
 pub use marginal::{SlowPart, slow_part_marginalised};
 
@@ -158,6 +160,18 @@ pub fn fit(
     start: Option<[&AxisNoise; 3]>,
     evaluations: usize,
 ) -> [AxisNoise; 3] {
+    fit_and_likelihoods(residual_ng, shared_ng, schedule, loudness, start, evaluations).map(|(noise, _)| noise)
+}
+
+/// The same, each with the log likelihood of its noise, the prior of that included.
+fn fit_and_likelihoods(
+    residual_ng: [&[f64]; 3],
+    shared_ng: [&[Vec<f64>]; 3],
+    schedule: &Schedule,
+    loudness: [&Loudness; 3],
+    start: Option<[&AxisNoise; 3]>,
+    evaluations: usize,
+) -> [(AxisNoise, f64); 3] {
     let n = schedule.len() as f64;
     let rms_ng = residual_ng.map(|residual| {
         let mean = residual.iter().sum::<f64>() / n;
@@ -221,13 +235,14 @@ pub fn fit(
         }
     }
     let best = simplexes.map(Simplex::best);
-    evaluate(best.each_ref().map(|p| &p[..])).map(|(noise, _)| noise)
+    evaluate(best.each_ref().map(|p| &p[..]))
 }
 
 /// Where a fit begins: the logarithms of 0.2, 100 s, 0.1 and 3000 s; and, where the noise is one with a memory and hardly white at
 /// all, with as much of the short part and four and ten
-/// times as much, of 25 s, 70 s and 200 s.
-const BEGINS: [[f64; 4]; 9] = [
+/// times as much, of 25 s, 70 s and 200 s; and, where it is all but slow, with four and sixteen times as much of that, of 1000 s and
+/// 6000 s.
+const BEGINS: [[f64; 4]; 13] = [
     [-1.609_437_912_434_100_3, 4.605_170_185_988_092, -2.302_585_092_994_045_5, 8.006_367_567_650_246],
     [0.0, 3.2, -2.30, 8.01],
     [0.0, 4.25, -2.30, 8.01],
@@ -237,6 +252,10 @@ const BEGINS: [[f64; 4]; 9] = [
     [1.4, 5.3, -2.30, 8.01],
     [2.3, 4.25, -2.30, 8.01],
     [2.3, 5.3, -2.30, 8.01],
+    [-1.61, 4.61, 1.4, 6.9],
+    [-1.61, 4.61, 1.4, 8.7],
+    [-1.61, 4.61, 2.8, 6.9],
+    [-1.61, 4.61, 2.8, 8.7],
 ];
 /// Log likelihood by which another beginning must be better than the usual one.
 const FAR_BETTER: f64 = 20.0;

@@ -31,6 +31,7 @@ use super::catalogue::Effect;
 use super::design::Frame;
 use super::locate;
 use super::model::{self, MemberFit};
+use super::noise::Contradicted;
 use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{Entry, Family, Member, Set, Weighed};
@@ -224,6 +225,14 @@ fn of_windows(scene: &Scene) -> Vec<String> {
             events.len(),
             LOG_AWAY_S / 86_400.0
         ));
+    }
+    for (axis, contradicted) in ["x", "y", "z"].iter().zip(scene.contradicted) {
+        if let Some(Contradicted { said, shown }) = contradicted {
+            notes.push(format!(
+                "the noise of axis {axis} is taken as {shown:.2} times as loud with the crew awake as asleep, which its windows show: \
+                 their deviations say {said:.2}"
+            ));
+        }
     }
     if bursts > 0 {
         notes.push(format!(

@@ -1,0 +1,61 @@
+//! Noise that is not as the deviations or the usual sizes have it: louder, slower, and as loud asleep as awake.
+
+use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
+use oare_ground::diagnose::answer::Verdict;
+use oare_ground::diagnose::case::Case;
+use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Level of the added noise, and its correlation time, s.
+struct Red {
+    level_ng: f64,
+    tau_s: f64,
+}
+
+/// A record in which nothing is missing, with an autoregression added that no crew has a share in.
+fn beside(red: &Red, seed: u64) -> Diagnosis {
+    let concealed = draw_order(&Order { kind: Kind::Clean, seed, only: None, manner: Manner::default() });
+    let mut case: Case = super::case(&concealed.files);
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let clock_s = case.recording.clock_s.clone();
+    for axis in &mut case.recording.a_ng {
+        let mut now = normal();
+        let mut before_s = clock_s[0];
+        for (value, at_s) in axis.iter_mut().zip(&clock_s) {
+            let keep = (-(at_s - before_s) / red.tau_s).exp();
+            now = keep * now + (1.0 - keep * keep).sqrt() * normal();
+            before_s = *at_s;
+            *value += red.level_ng * now;
+        }
+    }
+    diagnose(&case, &Settings::default()).unwrap()
+}
+
+/// Slow noise of 100 ng and more is no leak, step or line: it has the whole range of amplitudes to be.
+#[test]
+fn slow_noise_louder_than_any_instrument_should_have_is_no_finding() {
+    for (seed, red) in [
+        (1_250_000, Red { level_ng: 150.0, tau_s: 3000.0 }),
+        (1_250_001, Red { level_ng: 300.0, tau_s: 700.0 }),
+        (1_250_002, Red { level_ng: 1000.0, tau_s: 2000.0 }),
+        (1_250_005, Red { level_ng: 1500.0, tau_s: 240.0 }),
+    ] {
+        let answer = beside(&red, seed);
+        assert_eq!(answer.verdict, Verdict::Consistent, "{seed}: {:?} {:?}", super::ids(&answer), answer.hypothesis);
+    }
+}
+
+/// The samples are louder awake and the means of the windows are not: the windows are believed, and it is told.
+#[test]
+fn noise_that_does_not_follow_the_deviations_is_no_finding() {
+    for (seed, tau_s) in [(1_250_003, 36.0), (1_250_004, 110.0)] {
+        let answer = beside(&Red { level_ng: 1500.0, tau_s }, seed);
+        assert_eq!(answer.verdict, Verdict::Consistent, "{seed}: {:?} {:?}", super::ids(&answer), answer.hypothesis);
+        let told =
+            answer.notes.iter().filter(|note| note.contains("times as loud with the crew awake as asleep")).count();
+        assert_eq!(told, 3, "{seed}: {:?}", answer.notes);
+    }
+}
