@@ -14,8 +14,8 @@ struct Red {
     tau_s: f64,
 }
 
-/// A record in which nothing is missing, with an autoregression added that no crew has a share in.
-fn beside(red: &Red, seed: u64) -> Diagnosis {
+/// A record in which nothing is missing, with an autoregression added that no crew has a share in; so many times as loud at an instant.
+fn beside(red: &Red, louder: impl Fn(f64) -> f64, seed: u64) -> Diagnosis {
     let concealed = draw_order(&Order { kind: Kind::Clean, seed, only: None, manner: Manner::default() });
     let mut case: Case = super::case(&concealed.files);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -28,7 +28,7 @@ fn beside(red: &Red, seed: u64) -> Diagnosis {
             let keep = (-(at_s - before_s) / red.tau_s).exp();
             now = keep * now + (1.0 - keep * keep).sqrt() * normal();
             before_s = *at_s;
-            *value += red.level_ng * now;
+            *value += louder(*at_s) * red.level_ng * now;
         }
     }
     diagnose(&case, &Settings::default()).unwrap()
@@ -43,7 +43,7 @@ fn slow_noise_louder_than_any_instrument_should_have_is_no_finding() {
         (1_250_002, Red { level_ng: 1000.0, tau_s: 2000.0 }),
         (1_250_005, Red { level_ng: 1500.0, tau_s: 240.0 }),
     ] {
-        let answer = beside(&red, seed);
+        let answer = beside(&red, |_| 1.0, seed);
         assert_eq!(answer.verdict, Verdict::Consistent, "{seed}: {:?} {:?}", super::ids(&answer), answer.hypothesis);
     }
 }
@@ -52,10 +52,24 @@ fn slow_noise_louder_than_any_instrument_should_have_is_no_finding() {
 #[test]
 fn noise_that_does_not_follow_the_deviations_is_no_finding() {
     for (seed, tau_s) in [(1_250_003, 36.0), (1_250_004, 110.0)] {
-        let answer = beside(&Red { level_ng: 1500.0, tau_s }, seed);
+        let answer = beside(&Red { level_ng: 1500.0, tau_s }, |_| 1.0, seed);
         assert_eq!(answer.verdict, Verdict::Consistent, "{seed}: {:?} {:?}", super::ids(&answer), answer.hypothesis);
         let told =
             answer.notes.iter().filter(|note| note.contains("times as loud with the crew awake as asleep")).count();
+        assert_eq!(told, 3, "{seed}: {:?}", answer.notes);
+    }
+}
+
+/// Six hours five times as loud as the others, of which no log knows, and a level that follows the day.
+#[test]
+fn hours_that_are_louder_than_others_are_no_finding() {
+    let six_hours = |t: f64| if (10_000.0..31_600.0).contains(&(t % 86_400.0)) { 5.0 } else { 1.0 };
+    let by_day = |t: f64| 1.0 + 0.7 * (t / 86_400.0 * std::f64::consts::TAU).sin();
+    let levels: [&dyn Fn(f64) -> f64; 2] = [&six_hours, &by_day];
+    for (seed, louder) in (1_250_006..).zip(levels) {
+        let answer = beside(&Red { level_ng: 1500.0, tau_s: 5.0 }, louder, seed);
+        assert_eq!(answer.verdict, Verdict::Consistent, "{seed}: {:?} {:?}", super::ids(&answer), answer.hypothesis);
+        let told = answer.notes.iter().filter(|note| note.contains("is louder in some half hours")).count();
         assert_eq!(told, 3, "{seed}: {:?}", answer.notes);
     }
 }

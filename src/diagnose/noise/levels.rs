@@ -1,29 +1,44 @@
-//! How loud an axis is while the crew is awake, and while it sleeps.
+//! How loud an axis is while the crew is awake, while it sleeps, and from half hour to half hour.
 //!
-//! The average deviations inside the windows say so, but what is quick need not be in proportion to what a window's mean keeps. So it
-//! is a claim, and tested on the steps from window to window; where they contradict it, the likelier of both is taken, and told.
+//! The average deviations inside the windows and the log of sleep say so, but what is quick need not be in proportion to what a
+//! window's mean keeps, and who makes noise need not be in a log. So it is a claim, and tested on how the windows bend from one to the
+//! next, in which nothing slow has a share; where they contradict it, the likelier of both is taken, and told.
 
 use super::{Loudness, Schedule, fit_and_likelihoods};
 
-/// Fewest windows asleep, and awake, for the two to be told apart.
+/// Fewest windows asleep, awake, or of half an hour, for a level of their own.
 const FEWEST: usize = 30;
-/// Standard errors from which on the steps contradict the deviations.
+/// Standard errors from which on the windows contradict the deviations.
 const CONTRADICTED: f64 = 4.0;
+/// Standard deviations of chi square from which on half hours differ.
+const UNEVEN: f64 = 8.0;
+/// Length of a stretch with a level of its own, s.
+const STRETCH_S: f64 = 1800.0;
 /// Evaluations of the fits that are compared.
 const EVALUATIONS: usize = 110;
 /// Longest step that counts: windows further apart differ by more than the quick noise.
 const STEP_MAX_S: f64 = 60.0;
-/// Relative standard error of a median of the magnitudes of n normal numbers, times the root of n; of n steps half are counted as
+/// Relative standard error of a median of the magnitudes of n normal numbers, times the root of n; of n bends half are counted as
 /// independent.
 const OF_A_MEDIAN: f64 = 1.166 * std::f64::consts::SQRT_2;
 
-/// What the deviations say of an axis, and its windows contradict: how many times as loud it is awake as asleep.
+/// What is said of an axis, and its windows contradict.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contradicted {
-    /// By the deviations.
-    pub said: f64,
-    /// By the steps from window to window.
-    pub shown: f64,
+pub enum Contradicted {
+    /// How many times as loud it is awake as asleep.
+    Crew {
+        /// By the deviations.
+        said: f64,
+        /// By the windows.
+        shown: f64,
+    },
+    /// Some half hours are louder than others, whatever the crew does.
+    Stretches {
+        /// The quietest, beside the middle one.
+        quietest: f64,
+        /// The loudest.
+        loudest: f64,
+    },
 }
 
 /// Levels awake and asleep that the average deviations say; the same where they cannot.
@@ -39,51 +54,121 @@ fn said(dev_ng: &[f64], sleeps: &[bool]) -> [f64; 2] {
     }
 }
 
-/// How many times as large the steps of a residual are awake as asleep, and the relative standard error of that.
-fn shown(residual_ng: &[f64], schedule: &Schedule, sleeps: &[bool]) -> Option<(f64, f64)> {
-    let median = |state: bool| {
-        let steps = (1..schedule.len())
-            .filter(|i| schedule.step_s[*i] <= STEP_MAX_S && sleeps[*i] == state && sleeps[i - 1] == state);
-        let mut sizes: Vec<f64> = steps.map(|i| (residual_ng[i] - residual_ng[i - 1]).abs()).collect();
-        let (n, middle) = (sizes.len(), sizes.len() / 2);
-        let size = (n >= FEWEST).then(|| *sizes.select_nth_unstable_by(middle, f64::total_cmp).1)?;
-        (size > 0.0).then_some((size, n as f64))
+/// How much a residual bends at its windows, over how loud they are said to be: the magnitudes, each with its window.
+fn bends(residual_ng: &[f64], schedule: &Schedule, loudness: &Loudness) -> Vec<(usize, f64)> {
+    let evenly = |i: &usize| {
+        let [before, after] = [schedule.step_s[*i], schedule.step_s[i + 1]];
+        before <= STEP_MAX_S && after <= STEP_MAX_S && (0.8..1.25).contains(&(after / before))
     };
-    let ((awake, n), (asleep, m)) = (median(false)?, median(true)?);
-    Some((awake / asleep, OF_A_MEDIAN * (n.recip() + m.recip()).sqrt()))
+    let bend = |i: usize| {
+        let (at, [before, after]) = (residual_ng[i], [residual_ng[i - 1], residual_ng[i + 1]]);
+        (i, ((after - at) - (at - before) * schedule.step_s[i + 1] / schedule.step_s[i]).abs() / loudness.activity[i])
+    };
+    (1..schedule.len().saturating_sub(1)).filter(evenly).map(bend).collect()
 }
 
-/// How loud the windows of three axes are, from deviations, sleep and residual; and where the windows contradict the deviations.
+/// The median of some bends, and its relative standard error; none of too few.
+fn median(bends: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let mut sizes: Vec<f64> = bends.collect();
+    let (n, middle) = (sizes.len(), sizes.len() / 2);
+    let size = (n >= FEWEST).then(|| *sizes.select_nth_unstable_by(middle, f64::total_cmp).1)?;
+    (size > 0.0).then_some((size, OF_A_MEDIAN / (n as f64).sqrt()))
+}
+
+/// A level that the windows show against the one said, and by how much likelier its noise must be.
+type Shown = (Loudness, Contradicted, f64);
+
+/// The levels awake and asleep, where the windows contradict those said.
+fn by_crew(residual_ng: &[f64], schedule: &Schedule, said: &Loudness, sleeps: &[bool]) -> Option<Shown> {
+    let all = bends(residual_ng, schedule, said);
+    let of = |state: bool| median(all.iter().filter(|(i, _)| sleeps[*i] == state).map(|(_, bend)| *bend));
+    let ((awake, e), (asleep, f)) = (of(false)?, of(true)?);
+    let level = |state: bool| sleeps.iter().position(|s| *s == state).map_or(1.0, |i| said.activity[i]);
+    let was = level(false) / level(true);
+    let now = was * awake / asleep;
+    let differ = (now / was).ln().abs() > CONTRADICTED * e.hypot(f);
+    differ.then(|| (Loudness::of_crew([now, 1.0], sleeps), Contradicted::Crew { said: was, shown: now }, 0.0))
+}
+
+/// The half hour of a window.
+fn stretch(schedule: &Schedule, i: usize) -> usize {
+    ((schedule.clock_s[i] - schedule.clock_s[0]) / STRETCH_S) as usize
+}
+
+/// How loud every half hour is beside the middle one, over how loud it is said to be: a logarithm, and its standard error.
+fn of_stretches(residual_ng: &[f64], schedule: &Schedule, said: &Loudness) -> Vec<Option<(f64, f64)>> {
+    let all = bends(residual_ng, schedule, said);
+    let Some((middle, _)) = median(all.iter().map(|(_, bend)| *bend)) else { return Vec::new() };
+    let mut of_stretches: Vec<Vec<f64>> = vec![Vec::new(); stretch(schedule, schedule.len() - 1) + 1];
+    all.iter().for_each(|(i, bend)| of_stretches[stretch(schedule, *i)].push(*bend));
+    let level = |bends: Vec<f64>| median(bends.into_iter()).map(|(size, error)| ((size / middle).ln(), error));
+    of_stretches.into_iter().map(level).collect()
+}
+
+/// Levels of half hours, whatever the crew does, where they differ beyond what is said: as far as they are known, each moved towards
+/// the middle one by its error (James and Stein 1961). The noise changes at some instant inside one of them, so that each is as loud as
+/// the louder of itself and those beside it. A level for each is bought by a likelihood that is higher by their number.
+fn by_stretch(residual_ng: &[f64], schedule: &Schedule, said: &Loudness) -> Option<Shown> {
+    let beyond = of_stretches(residual_ng, schedule, said);
+    let n = beyond.iter().flatten().count() as f64;
+    let chi2: f64 = beyond.iter().flatten().map(|(x, error)| (x / error).powi(2)).sum();
+    if n < 2.0 || chi2 < n + UNEVEN * (2.0 * n).sqrt() {
+        return None;
+    }
+    let levels = of_stretches(residual_ng, schedule, &Loudness::even(vec![1.0; schedule.len()]));
+    let level = |i: usize| {
+        let near = levels[i.saturating_sub(1)..(i + 2).min(levels.len())].iter().flatten();
+        let moved = near.map(|(x, error)| if x.abs() > *error { x - error * error / x } else { 0.0 });
+        moved.reduce(f64::max).unwrap_or(0.0).exp()
+    };
+    let levels: Vec<f64> = (0..levels.len()).map(level).collect();
+    let [quietest, loudest] = [f64::min, f64::max].map(|which| levels.iter().copied().reduce(which).unwrap_or(1.0));
+    let raw: Vec<f64> = (0..schedule.len()).map(|i| levels[stretch(schedule, i)]).collect();
+    let rms = (raw.iter().map(|x| x * x).sum::<f64>() / raw.len() as f64).sqrt();
+    let shown = Loudness::even(raw.iter().map(|x| x / rms).collect());
+    Some((shown, Contradicted::Stretches { quietest, loudest }, n))
+}
+
+/// How loud the windows of three axes are, from deviations, sleep and residual; and where the windows contradict that.
 pub fn settled(
     dev_ng: [&[f64]; 3],
     sleeps: &[bool],
     residual_ng: [&[f64]; 3],
     schedule: &Schedule,
 ) -> ([Loudness; 3], [Option<Contradicted>; 3]) {
-    let levels = dev_ng.map(|dev| said(dev, sleeps));
-    let as_said = levels.map(|levels| Loudness::of_crew(levels, sleeps));
-    let contradicted: [Option<Contradicted>; 3] = std::array::from_fn(|k| {
-        let said = levels[k][0] / levels[k][1];
-        let (shown, error) = shown(residual_ng[k], schedule, sleeps)?;
-        ((shown / said).ln().abs() > CONTRADICTED * error).then_some(Contradicted { said, shown })
-    });
-    if contradicted.iter().all(Option::is_none) {
-        return (as_said, contradicted);
+    let mut settled = dev_ng.map(|dev| (Loudness::of_crew(said(dev, sleeps), sleeps), None));
+    let crew = |k: usize, said: &Loudness| by_crew(residual_ng[k], schedule, said, sleeps);
+    let stretches = |k: usize, said: &Loudness| by_stretch(residual_ng[k], schedule, said);
+    decide(&mut settled, residual_ng, schedule, crew);
+    decide(&mut settled, residual_ng, schedule, stretches);
+    let contradicted = settled.each_ref().map(|axis| axis.1);
+    (settled.map(|axis| axis.0), contradicted)
+}
+
+/// Takes what the windows show where it makes the noise of an axis likelier than what was said.
+fn decide(
+    settled: &mut [(Loudness, Option<Contradicted>); 3],
+    residual_ng: [&[f64]; 3],
+    schedule: &Schedule,
+    show: impl Fn(usize, &Loudness) -> Option<Shown>,
+) {
+    let shown: [Option<Shown>; 3] = std::array::from_fn(|k| show(k, &settled[k].0));
+    if shown.iter().all(Option::is_none) {
+        return;
     }
-    let as_shown: [Loudness; 3] = std::array::from_fn(|k| {
-        contradicted[k].map_or(as_said[k].clone(), |c| Loudness::of_crew([c.shown, 1.0], sleeps))
-    });
     let shared = schedule.shared_ng.each_ref().map(|errors| &errors[..]);
-    let likelihoods = |loudness: &[Loudness; 3]| {
-        fit_and_likelihoods(residual_ng, shared, schedule, loudness.each_ref(), None, EVALUATIONS).map(|(_, l)| l)
+    let likelihoods = |loudness: [&Loudness; 3]| {
+        fit_and_likelihoods(residual_ng, shared, schedule, loudness, None, EVALUATIONS).map(|(_, l)| l)
     };
-    let (by_said, by_shown) = (likelihoods(&as_said), likelihoods(&as_shown));
-    let better: [bool; 3] = std::array::from_fn(|k| by_shown[k] > by_said[k]);
-    let axes: [_; 3] = std::array::from_fn(|k| {
-        if better[k] { (as_shown[k].clone(), contradicted[k]) } else { (as_said[k].clone(), None) }
-    });
-    let contradicted = axes.each_ref().map(|axis| axis.1);
-    (axes.map(|axis| axis.0), contradicted)
+    let before = likelihoods(settled.each_ref().map(|axis| &axis.0));
+    let after = likelihoods(std::array::from_fn(|k| shown[k].as_ref().map_or(&settled[k].0, |shown| &shown.0)));
+    for (k, shown) in shown.into_iter().enumerate() {
+        if let Some((loudness, contradicted, by)) = shown
+            && after[k] > before[k] + by
+        {
+            settled[k] = (loudness, Some(contradicted));
+        }
+    }
 }
 
 #[cfg(test)]
@@ -130,8 +215,41 @@ mod tests {
         for (seed, noise) in [(1, WHITE), (2, red), (3, red)] {
             for ratio in [1.0, 3.0] {
                 for contradicted in record(seed, &noise, ratio).1 {
-                    let found = contradicted.unwrap_or_else(|| panic!("{seed} {ratio} {noise:?}"));
-                    assert!((found.said - 1.7).abs() < 1e-9 && (found.shown / ratio).ln().abs() < 0.15, "{found:?}");
+                    let Some(Contradicted::Crew { said, shown }) = contradicted else {
+                        panic!("{seed} {ratio} {noise:?}: {contradicted:?}")
+                    };
+                    assert!((said - 1.7).abs() < 1e-9 && (shown / ratio).ln().abs() < 0.15, "{said} {shown}");
+                }
+            }
+        }
+    }
+
+    /// Four hours three times as loud that no log has, and noise whose level wanders: the levels are within a third of the true ones where
+    /// these are even for an hour, and never lower by more.
+    #[test]
+    fn hours_that_no_log_has_are_as_loud_as_they_are() {
+        let schedule = Schedule::new(&(0..5200).map(|i| 25.0 * f64::from(i)).collect::<Vec<f64>>());
+        let loud = |t: f64| if (40_000.0..54_400.0).contains(&t) { 3.0 } else { 1.0 };
+        let wandering = |t: f64| (0.6 * (t / 9000.0).sin()).exp();
+        let levels: [&dyn Fn(f64) -> f64; 2] = [&loud, &wandering];
+        for (seed, level) in levels.into_iter().enumerate() {
+            let mut truth: Vec<f64> = schedule.clock_s.iter().map(|t| level(*t)).collect();
+            let rms = (truth.iter().map(|x| x * x).sum::<f64>() / truth.len() as f64).sqrt();
+            truth.iter_mut().for_each(|x| *x /= rms);
+            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed as u64);
+            let noise = Loudness::even(truth.clone());
+            let residual: [Vec<f64>; 3] =
+                std::array::from_fn(|_| simulate(&WHITE, &schedule, &noise, || StandardNormal.sample(&mut rng)));
+            let (never, dev_ng) = (vec![false; schedule.len()], vec![200.0; schedule.len()]);
+            let (loudness, contradicted) =
+                settled([&dev_ng; 3], &never, residual.each_ref().map(|x| &x[..]), &schedule);
+            for (loudness, contradicted) in loudness.iter().zip(contradicted) {
+                assert!(matches!(contradicted, Some(Contradicted::Stretches { .. })), "{contradicted:?}");
+                let middle = |x: &[f64]| x[1000];
+                for i in (200..5000).step_by(100) {
+                    let ratio = loudness.activity[i] / middle(&loudness.activity) * middle(&truth) / truth[i];
+                    let even = truth[i - 150..i + 150].iter().all(|x| (x / truth[i] - 1.0).abs() < 0.01);
+                    assert!(ratio > 0.6 && (!even || ratio < 1.67), "{seed} {i}: {ratio}");
                 }
             }
         }

@@ -227,11 +227,16 @@ fn of_windows(scene: &Scene) -> Vec<String> {
         ));
     }
     for (axis, contradicted) in ["x", "y", "z"].iter().zip(scene.contradicted) {
-        if let Some(Contradicted { said, shown }) = contradicted {
-            notes.push(format!(
+        match contradicted {
+            Some(Contradicted::Crew { said, shown }) => notes.push(format!(
                 "the noise of axis {axis} is taken as {shown:.2} times as loud with the crew awake as asleep, which its windows show: \
                  their deviations say {said:.2}"
-            ));
+            )),
+            Some(Contradicted::Stretches { quietest, loudest }) => notes.push(format!(
+                "the noise of axis {axis} is louder in some half hours than the crew's sleep and the deviations say, as its windows show: \
+                 {quietest:.2} to {loudest:.2} times the middle one, and is taken so"
+            )),
+            None => {}
         }
     }
     if bursts > 0 {
