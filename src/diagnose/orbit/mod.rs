@@ -2,6 +2,7 @@
 
 pub mod arc;
 pub mod forces;
+pub mod held_out;
 pub mod manoeuvre;
 pub mod report;
 pub mod search;

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::arc::{Arc, ArcFit};
 use super::forces::Term;
+use super::held_out::median_second_half_m;
 use super::manoeuvre::Manoeuvre;
 use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m};
 use crate::diagnose::answer::{Alternative, Interval, Located, ParameterAnswer, Verdict};
@@ -271,20 +272,29 @@ fn fit(problem: &Problem, first: &Level, last: &Level) -> Fit {
         let whitened_chi2_per_dof = rms_total * rms_total / (3.0 * problem.sigma_m * problem.sigma_m);
         FitLevel { rms: axis_rms(problem, level), rms_total, whitened_chi2_per_dof }
     };
-    let held_out = match (problem.median_predicted_m(first), problem.median_predicted_m(last)) {
-        (Some(before), Some(after)) => {
-            let floor = 3.0 * problem.sigma_m * problem.sigma_m;
-            let excess = (before * before - floor).max(1e-12);
-            Some(HeldOut {
-                scheme: "what follows fit_hours, predicted; median of the arcs, 3-D".to_owned(),
-                before_rms: vec![before],
-                after_rms: vec![after],
-                excess_removed: ((before * before - after * after) / excess).clamp(-1.0, 1.0),
-            })
+    let beyond = [first, last].map(|level| problem.median_predicted_m(level));
+    let halves = [first, last].map(|level| median_second_half_m(problem, level));
+    let held_out = match (beyond, halves) {
+        ([Some(before), Some(after)], _) => {
+            Some(held_out(problem, "what follows fit_hours, predicted; median of the arcs, 3-D", before, after))
+        }
+        (_, [Some(before), Some(after)]) => {
+            Some(held_out(problem, "the second half of each arc, from its first; median of the arcs, 3-D", before, after))
         }
         _ => None,
     };
     Fit { noise_floor: vec![problem.sigma_m; 3], before: level(first), after: level(last), held_out }
+}
+
+fn held_out(problem: &Problem, scheme: &str, before_m: f64, after_m: f64) -> HeldOut {
+    let floor = 3.0 * problem.sigma_m * problem.sigma_m;
+    let excess = (before_m * before_m - floor).max(1e-12);
+    HeldOut {
+        scheme: scheme.to_owned(),
+        before_rms: vec![before_m],
+        after_rms: vec![after_m],
+        excess_removed: ((before_m * before_m - after_m * after_m) / excess).clamp(-1.0, 1.0),
+    }
 }
 
 fn limits(problem: &Problem, search: &Search, last: &Level) -> Vec<Limit> {
