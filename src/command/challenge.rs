@@ -38,6 +38,9 @@ pub struct Args {
     /// The noise of records with slow noise is smooth, as no autoregression is.
     #[arg(long)]
     smooth: bool,
+    /// The noise of records with slow noise is flicker noise: of the same power in every octave, up to 60 ng.
+    #[arg(long, conflicts_with = "smooth")]
+    flicker: bool,
     /// One half window in a hundred is ten times as loud; the SNR does not know of it.
     #[arg(long)]
     bursts: bool,
@@ -107,8 +110,8 @@ fn concealed(args: &Args, engine: &Engine) -> anyhow::Result<Option<Vec<Outcome>
         (true, Some(id)) if effect::IDS.contains(&id) => vec![Kind::One],
         (true, Some(_)) => vec![Kind::Unknown],
     };
-    let Args { hours, other_physics, smooth, bursts, dump, .. } = *args;
-    let manner = Manner { hours, other_physics, smooth, bursts, dump };
+    let Args { hours, other_physics, smooth, flicker, bursts, dump, .. } = *args;
+    let manner = Manner { hours, other_physics, smooth, flicker, bursts, dump };
     let orders = run::plan(args.cases, args.seed, &kinds, manner, only);
     let progress = bar(orders.len(), "sealing");
     let seals = run::seal(&orders, &progress);

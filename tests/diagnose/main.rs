@@ -5,6 +5,7 @@ mod dump;
 mod formula;
 mod lag;
 mod limits;
+mod listed;
 mod loud;
 mod odd;
 mod separating;

@@ -14,3 +14,14 @@ fn smooth_slow_noise_is_no_finding() {
         assert_eq!(answer.verdict, Verdict::Consistent, "{seed}: {answer:?}");
     }
 }
+
+/// Slow noise of the same power in every octave, to days: the slowest octaves, which an autoregression lacks, would be a step and a drift.
+#[test]
+fn flicker_noise_is_no_finding() {
+    for seed in [1_250_008, 1_250_043] {
+        let manner = Manner { flicker: true, ..Manner::default() };
+        let concealed = draw_order(&Order { kind: Kind::Slow, seed, only: None, manner });
+        let answer = diagnose(&super::case(&concealed.files), &Settings::default()).unwrap();
+        assert_eq!(answer.verdict, Verdict::Consistent, "{seed}: {answer:?}");
+    }
+}

@@ -93,6 +93,8 @@ pub struct Manner {
     /// Slow noise, where there is some, is smooth: its spectrum falls as the eighth power of frequency where that of an autoregression
     /// falls as the square.
     pub smooth: bool,
+    /// Slow noise, where there is some, is flicker noise: of the same power in every octave from five minutes to three days, 60 ng at most.
+    pub flicker: bool,
     /// Bursts in the noise, which the SNR does not know of.
     pub bursts: bool,
     /// The recording is a dump of the payload recorder: the simulator's instrument feels what the flight has, calibrates itself, and
@@ -103,7 +105,7 @@ pub struct Manner {
 impl Default for Manner {
     /// As the open cases are.
     fn default() -> Self {
-        Self { hours: 36, other_physics: false, smooth: false, bursts: false, dump: false }
+        Self { hours: 36, other_physics: false, smooth: false, flicker: false, bursts: false, dump: false }
     }
 }
 
@@ -259,6 +261,7 @@ impl Question {
         let mut suffix = String::new();
         suffix += if order.manner.other_physics { "-other" } else { "" };
         suffix += if order.manner.smooth { "-smooth" } else { "" };
+        suffix += if order.manner.flicker { "-flicker" } else { "" };
         suffix += if order.manner.bursts { "-bursts" } else { "" };
         suffix += if order.manner.dump { "-dump" } else { "" };
         let id = format!("{}-{:06}{suffix}", order.kind.word(), order.seed);

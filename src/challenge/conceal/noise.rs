@@ -25,10 +25,21 @@ pub struct Noise {
     pub slow_ng: [f64; 3],
     /// Its correlation time, s.
     pub slow_s: f64,
-    /// Whether the slow noise is smooth: an autoregression seen through three lags of its own memory.
-    pub smooth: bool,
+    /// Of what kind the slow noise is.
+    pub wander: Wander,
     /// Whether one half window in a hundred is ten times as loud.
     pub bursts: bool,
+}
+
+/// Of what kind slow noise is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wander {
+    /// An autoregression.
+    Autoregression,
+    /// An autoregression seen through three lags of its own memory.
+    Smooth,
+    /// Flicker noise: as many autoregressions of equal power as there are octaves from five minutes to three days.
+    Flicker,
 }
 
 /// Share of half windows that are bursts, and how much louder they are.
@@ -39,7 +50,13 @@ impl Noise {
     pub fn draw(rng: &mut ChaCha12Rng, slow: bool, manner: Manner) -> Self {
         let x_ng = log_between(rng, 55.0, 330.0);
         let awake_ng = [x_ng, x_ng * between(rng, 0.45, 0.50), x_ng * between(rng, 0.56, 0.62)];
-        let slow_ng = std::array::from_fn(|_| if slow { between(rng, 5.0, 30.0) } else { 0.0 });
+        let largest_ng = if manner.flicker { FLICKER_NG } else { 30.0 };
+        let slow_ng = std::array::from_fn(|_| if slow { between(rng, 5.0, largest_ng) } else { 0.0 });
+        let wander = match (manner.smooth, manner.flicker) {
+            (_, true) => Wander::Flicker,
+            (true, false) => Wander::Smooth,
+            (false, false) => Wander::Autoregression,
+        };
         Self {
             awake_ng,
             asleep: between(rng, 0.55, 0.68),
@@ -47,7 +64,7 @@ impl Noise {
             red_s: log_between(rng, 100.0, 500.0),
             slow_ng,
             slow_s: log_between(rng, 300.0, 10_800.0),
-            smooth: manner.smooth,
+            wander,
             bursts: manner.bursts,
         }
     }
@@ -120,43 +137,73 @@ impl Noise {
 const LAGS: usize = 3;
 const MEMORIES: f64 = 3.5;
 
+/// Octaves of flicker noise, the shortest correlation time, s, and its largest deviation in all of them, ng.
+const OCTAVES: usize = 10;
+const SHORTEST_S: f64 = 300.0;
+const FLICKER_NG: f64 = 60.0;
+
 /// Slow noise of unit variance, window by window.
-struct Slow {
-    keep: f64,
-    /// The autoregression, and what each lag makes of the one before.
-    states: [f64; 1 + LAGS],
-    /// The last of them, and its standard deviation.
-    last: usize,
-    sd: f64,
+enum Slow {
+    /// One autoregression, perhaps through lags.
+    One {
+        keep: f64,
+        /// The autoregression, and what each lag makes of the one before.
+        states: [f64; 1 + LAGS],
+        /// The last of them, and its standard deviation.
+        last: usize,
+        sd: f64,
+    },
+    /// Several of equal power.
+    Flicker { keep: [f64; OCTAVES], states: [f64; OCTAVES] },
 }
 
 impl Slow {
     fn new(rng: &mut ChaCha12Rng, noise: &Noise) -> Self {
-        if !noise.smooth {
-            return Self { keep: keep(noise.slow_s), states: [normal(rng), 0.0, 0.0, 0.0], last: 0, sd: 1.0 };
+        match noise.wander {
+            Wander::Autoregression => {
+                Self::One { keep: keep(noise.slow_s), states: [normal(rng), 0.0, 0.0, 0.0], last: 0, sd: 1.0 }
+            }
+            Wander::Flicker => Self::Flicker {
+                keep: std::array::from_fn(|i| keep(SHORTEST_S * 2f64.powi(i as i32))),
+                states: std::array::from_fn(|_| normal(rng)),
+            },
+            Wander::Smooth => {
+                let memory_s = noise.slow_s / MEMORIES;
+                let keep = keep(memory_s);
+                let settles = (30.0 * memory_s / WINDOW_STRIDE_S) as usize;
+                let mut states = [0.0; 1 + LAGS];
+                let response: Vec<f64> =
+                    (0..settles).map(|k| lagged(&mut states, keep, LAGS, f64::from(u8::from(k == 0)))).collect();
+                let sd = response.iter().map(|x| x * x).sum::<f64>().sqrt();
+                let mut slow = Self::One { keep, states, last: LAGS, sd };
+                for _ in 0..settles {
+                    slow.next(rng);
+                }
+                slow
+            }
         }
-        let memory_s = noise.slow_s / MEMORIES;
-        let mut slow = Self { keep: keep(memory_s), states: [0.0; 1 + LAGS], last: LAGS, sd: 1.0 };
-        let settles = (30.0 * memory_s / WINDOW_STRIDE_S) as usize;
-        let response: Vec<f64> = (0..settles).map(|k| slow.step(f64::from(u8::from(k == 0)))).collect();
-        slow.sd = response.iter().map(|x| x * x).sum::<f64>().sqrt();
-        for _ in 0..settles {
-            slow.next(rng);
-        }
-        slow
-    }
-
-    fn step(&mut self, normal: f64) -> f64 {
-        self.states[0] = self.keep * self.states[0] + (1.0 - self.keep * self.keep).sqrt() * normal;
-        for i in 1..=self.last {
-            self.states[i] = self.keep * self.states[i] + (1.0 - self.keep) * self.states[i - 1];
-        }
-        self.states[self.last] / self.sd
     }
 
     fn next(&mut self, rng: &mut ChaCha12Rng) -> f64 {
-        self.step(normal(rng))
+        match self {
+            Self::One { keep, states, last, sd } => lagged(states, *keep, *last, normal(rng)) / *sd,
+            Self::Flicker { keep, states } => {
+                for (x, keep) in states.iter_mut().zip(keep) {
+                    *x = *keep * *x + (1.0 - *keep * *keep).sqrt() * normal(rng);
+                }
+                states.iter().sum::<f64>() / (OCTAVES as f64).sqrt()
+            }
+        }
     }
+}
+
+/// An autoregression goes on by one normal number, and what lags behind it follows; gives the last of them.
+fn lagged(states: &mut [f64; 1 + LAGS], keep: f64, last: usize, normal: f64) -> f64 {
+    states[0] = keep * states[0] + (1.0 - keep * keep).sqrt() * normal;
+    for i in 1..=last {
+        states[i] = keep * states[i] + (1.0 - keep) * states[i - 1];
+    }
+    states[last]
 }
 
 /// A linear map from a series on the window grid to one of unit variance on the kept windows.
@@ -241,6 +288,7 @@ mod tests {
         let mut rng = ChaCha12Rng::seed_from_u64(2);
         let manner = Manner { smooth: true, ..Manner::default() };
         let noise = Noise { slow_ng: [20.0; 3], slow_s: 1000.0, ..Noise::draw(&mut rng, true, manner) };
+        assert_eq!(noise.wander, Wander::Smooth);
         let windows = 400_000;
         let series = noise.slow_series(&mut rng, 0, windows);
         let at = |lag: usize| series.iter().zip(&series[lag..]).map(|(a, b)| a * b).sum::<f64>() / windows as f64;
@@ -249,5 +297,21 @@ mod tests {
         assert!((at(0) / 400.0 - 1.0).abs() < 0.1, "{}", at(0));
         assert!((at(40) / at(0) - (-1f64).exp()).abs() < 0.06, "{}", at(40) / at(0));
         assert!(at(1) / at(0) > 0.998, "{}", at(1) / at(0));
+    }
+
+    /// Flicker noise has half of its power in half of its octaves: what means over an hour and a half (a factor of eighteen over five
+    /// minutes) keep is that of the six longest, three fifths, and a part of the next.
+    #[test]
+    fn flicker_noise_has_the_size_that_is_said_and_as_much_of_it_in_every_octave() {
+        let mut rng = ChaCha12Rng::seed_from_u64(3);
+        let manner = Manner { flicker: true, ..Manner::default() };
+        let noise = Noise { slow_ng: [20.0; 3], ..Noise::draw(&mut rng, true, manner) };
+        let series = noise.slow_series(&mut rng, 0, 1_500_000);
+        let variance = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64;
+        let means: Vec<f64> = series.chunks(216).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect();
+        // The longest octave comes 240 times: its variance, a tenth of all, is known to a tenth.
+        assert!((variance(&series) / 400.0 - 1.0).abs() < 0.1, "{}", variance(&series));
+        let kept = variance(&means) / variance(&series);
+        assert!((0.6..0.75).contains(&kept), "{kept}");
     }
 }

@@ -1,6 +1,6 @@
 //! Drag off by a fraction: drag coefficient, area or density wrong by a factor, or the whole term absent.
 
-use super::{Effect, Linear, Shape, full, no_density, one_point};
+use super::{Effect, Linear, Shape, USUAL_OR_SMALL, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,6 +12,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "density",
     mistaken_for: &["scale_factor of the ram axis", "a bias in a fixed attitude", "atmosphere_corotation"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.5, size_max: 3.0, whole: false }],
+    scales: USUAL_OR_SMALL,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,

@@ -1,6 +1,6 @@
 //! The bias decays exponentially; amplitudes refer to the first instant of the simulation.
 
-use super::{Effect, Nonlinear, Shape, Theta, push};
+use super::{Effect, Nonlinear, Shape, Theta, USUAL_OR_SMALL, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -13,6 +13,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "time",
     mistaken_for: &["vent_leak", "temperature_bias", "a trend of density"],
     linear: &push(150.0, 20000.0),
+    scales: USUAL_OR_SMALL,
     nonlinear: &[Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.2, range: [7.6, 13.5], ..Nonlinear::PLAIN }],
     grid,
     log_density,

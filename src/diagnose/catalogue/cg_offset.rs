@@ -2,7 +2,7 @@
 
 use crate::units::NANO_G_M_S2;
 
-use super::{Effect, Linear, Shape, full, no_density, one_point};
+use super::{Effect, Linear, Shape, USUAL_OR_SMALL, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -18,6 +18,7 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "dy_m", unit: "m", size: 0.6, size_max: 3.0, whole: false },
         Linear { name: "dz_m", unit: "m", size: 0.6, size_max: 3.0, whole: false },
     ],
+    scales: USUAL_OR_SMALL,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,

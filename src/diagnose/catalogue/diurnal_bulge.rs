@@ -1,6 +1,6 @@
 //! Day-night variation of density: a_d cos psi, psi from the apex 30 degrees east of the Sun.
 
-use super::{Effect, Linear, Shape, full, no_density, one_point};
+use super::{Effect, Linear, Shape, USUAL_OR_SMALL, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 use crate::physics::bulge;
 
@@ -13,6 +13,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "local_time",
     mistaken_for: &["solar_radiation_pressure", "temperature_bias"],
     linear: &[Linear { name: "amplitude", unit: "1", size: 0.4, size_max: 2.0, whole: false }],
+    scales: USUAL_OR_SMALL,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,

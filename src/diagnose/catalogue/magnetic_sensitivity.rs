@@ -1,6 +1,6 @@
 //! The sensor feels the geomagnetic field: a = K B in body axes.
 
-use super::{Effect, Linear, Shape, no_density, one_point};
+use super::{ANY_SIZE, Effect, Linear, Shape, no_density, one_point};
 use crate::diagnose::design::Raw;
 use crate::diagnose::scene::Scene;
 
@@ -23,6 +23,7 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "kzy_ng_per_t", unit: "ng/T", size: 1.0e6, size_max: 2.0e7, whole: false },
         Linear { name: "kzz_ng_per_t", unit: "ng/T", size: 1.0e6, size_max: 2.0e7, whole: false },
     ],
+    scales: ANY_SIZE,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,

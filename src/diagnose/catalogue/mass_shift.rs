@@ -2,7 +2,7 @@
 
 use crate::units::NANO_G_M_S2;
 
-use super::{Effect, Linear, Nonlinear, Shape, Theta, no_density};
+use super::{Effect, Linear, Nonlinear, Shape, Theta, USUAL_OR_SMALL, no_density};
 use crate::diagnose::design::Raw;
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
@@ -20,6 +20,7 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "dy_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },
         Linear { name: "dz_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },
     ],
+    scales: USUAL_OR_SMALL,
     nonlinear: &[Nonlinear { name: "onset_s", unit: "s", ..Nonlinear::PLAIN }],
     grid,
     log_density: no_density,

@@ -1,6 +1,6 @@
 //! The sensor's axes are turned by a small right-handed angle r: recorded = a + a x r.
 
-use super::{Effect, Linear, Shape, no_density, one_point};
+use super::{Effect, Linear, Shape, USUAL_OR_SMALL, no_density, one_point};
 use crate::diagnose::design::Raw;
 use crate::diagnose::scene::Scene;
 
@@ -17,6 +17,7 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "ry_rad", unit: "rad", size: 0.08, size_max: 0.6, whole: false },
         Linear { name: "rz_rad", unit: "rad", size: 0.08, size_max: 0.6, whole: false },
     ],
+    scales: USUAL_OR_SMALL,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,

@@ -78,6 +78,8 @@ pub struct Effect {
     pub mistaken_for: &'static [&'static str],
     /// Linear coefficients, in the order of the columns.
     pub linear: &'static [Linear],
+    /// What the usual sizes may be multiplied by, each as likely.
+    pub scales: &'static [f64],
     /// Nonlinear parameters, in the order of [`Theta`].
     pub nonlinear: &'static [Nonlinear],
     /// Starting points over the whole prior range.
@@ -93,6 +95,13 @@ pub struct Effect {
     /// Why it is this one, for a flight engineer.
     pub why: &'static str,
 }
+
+/// Scales of a term that has one size.
+pub const ONE_SIZE: &[f64] = &[1.0];
+/// Scales of an effect that is of its usual size or well below it.
+pub const USUAL_OR_SMALL: &[f64] = &[1.0, 0.2];
+/// Scales of an effect whose size nobody knows beforehand: its prior must not take from a large one what another form then gives back.
+pub const ANY_SIZE: &[f64] = &[1.0, 0.2, 5.0];
 
 /// A linear coefficient.
 pub struct Linear {

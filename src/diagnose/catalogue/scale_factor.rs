@@ -1,6 +1,6 @@
 //! One axis reads (1 + fraction) times the truth.
 
-use super::{Effect, Linear, Nonlinear, Shape, Theta, no_density};
+use super::{Effect, Linear, Nonlinear, Shape, Theta, USUAL_OR_SMALL, no_density};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,6 +12,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "modelled_signal",
     mistaken_for: &["aerodynamic_drag"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 1.5, whole: false }],
+    scales: USUAL_OR_SMALL,
     nonlinear: &[Nonlinear { name: "axis", range: [0.0, 2.0], ..Nonlinear::PLAIN }],
     grid,
     log_density: no_density,

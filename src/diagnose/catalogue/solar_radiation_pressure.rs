@@ -1,6 +1,6 @@
 //! Sunlight's push, none in shadow: a = -nu coefficient P (sum |s_i| area_i) / m s.
 
-use super::{Effect, Linear, Shape, full, no_density, one_point};
+use super::{Effect, Linear, Shape, USUAL_OR_SMALL, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 use crate::physics::solar_radiation;
 use crate::units::NANO_G_M_S2;
@@ -14,6 +14,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "sun_angle",
     mistaken_for: &["temperature_bias, which lags", "diurnal_bulge"],
     linear: &[Linear { name: "coefficient", unit: "1", size: 4.0, size_max: 40.0, whole: false }],
+    scales: USUAL_OR_SMALL,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,

@@ -4,7 +4,7 @@
 //! cross wind then shows more area whichever way it blows. So no one derivative serves. The columns are taken about a wind, exact
 //! there and to first order beside it, and the wind they are taken about follows the one fitted.
 
-use super::{Effect, Linear, Shape, Theta, full, no_density};
+use super::{Effect, Linear, Shape, Theta, USUAL_OR_SMALL, full, no_density};
 use crate::diagnose::scene::Scene;
 use crate::physics::Vec3;
 
@@ -20,6 +20,7 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "along_m_s", unit: "m/s", size: 300.0, size_max: 800.0, whole: false },
         Linear { name: "cross_m_s", unit: "m/s", size: 300.0, size_max: 800.0, whole: false },
     ],
+    scales: USUAL_OR_SMALL,
     nonlinear: &[],
     grid: headings,
     log_density: no_density,

@@ -1,6 +1,6 @@
 //! The recording's clock runs ahead: what happened at t is labelled t + offset.
 
-use super::{Effect, Nonlinear, Shape, Theta};
+use super::{Effect, Nonlinear, ONE_SIZE, Shape, Theta};
 use crate::diagnose::measure::window_means;
 use crate::diagnose::scene::Scene;
 
@@ -13,6 +13,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "modelled_signal",
     mistaken_for: &["an attitude latency (the same)"],
     linear: &[],
+    scales: ONE_SIZE,
     nonlinear: &[Nonlinear {
         name: "offset_s",
         unit: "s",

@@ -20,22 +20,12 @@ pub struct Binned {
 impl Binned {
     /// Of a residual at the windows. Windows in which a burst is are left out.
     pub fn new(residual_ng: &[f64], noise: &AxisNoise, schedule: &Schedule, loudness: &Loudness) -> Self {
-        let bin = |i: usize| ((schedule.clock_s[i] - schedule.clock_s[0]) / BIN_S) as usize;
-        let n = schedule.len();
-        let bins = if n == 0 { 0 } else { bin(n - 1) + 1 };
-        let mut binned = Self { mean_ng: vec![0.0; bins], variance_ng2: vec![f64::INFINITY; bins] };
-        let bursts = |i: usize| loudness.burst[i] > 1.0 || (i > 0 && loudness.burst[i - 1] > 1.0);
-        let mut first = 0;
-        while first < n {
-            let after = (first..n).find(|i| bin(*i) > bin(first)).unwrap_or(n);
-            let windows: Vec<usize> = (first..after).filter(|i| !bursts(*i)).collect();
-            if windows.len() >= WINDOWS_MIN {
-                let count = windows.len() as f64;
-                binned.mean_ng[bin(first)] = windows.iter().map(|i| residual_ng[*i]).sum::<f64>() / count;
-                binned.variance_ng2[bin(first)] =
-                    variance_of_sum(&windows, noise, schedule, &loudness.activity) / (count * count);
-            }
-            first = after;
+        let bins = bins(schedule, loudness);
+        let mut binned = Self { mean_ng: vec![0.0; bins.len()], variance_ng2: vec![f64::INFINITY; bins.len()] };
+        for (bin, windows) in bins.iter().enumerate().filter(|(_, windows)| windows.len() >= WINDOWS_MIN) {
+            let count = windows.len() as f64;
+            binned.mean_ng[bin] = windows.iter().map(|i| residual_ng[*i]).sum::<f64>() / count;
+            binned.variance_ng2[bin] = variance_of_sum(windows, noise, schedule, &loudness.activity) / (count * count);
         }
         binned
     }
@@ -70,6 +60,22 @@ impl Binned {
         let [dd, dc, cc] = squares;
         if cc > 0.0 { -0.5 * (log_det + dd - dc * dc / cc) } else { 0.0 }
     }
+}
+
+/// The windows of each bin, without those in which a burst is.
+fn bins(schedule: &Schedule, loudness: &Loudness) -> Vec<Vec<usize>> {
+    let bin = |i: usize| ((schedule.clock_s[i] - schedule.clock_s[0]) / BIN_S) as usize;
+    let n = schedule.len();
+    let mut bins = vec![Vec::new(); if n == 0 { 0 } else { bin(n - 1) + 1 }];
+    let bursts = |i: usize| loudness.burst[i] > 1.0 || (i > 0 && loudness.burst[i - 1] > 1.0);
+    (0..n).filter(|i| !bursts(*i)).for_each(|i| bins[bin(i)].push(i));
+    bins
+}
+
+/// Means of another series over the same bins.
+pub(super) fn means(series: &[f64], schedule: &Schedule, loudness: &Loudness) -> Vec<f64> {
+    let mean = |windows: &Vec<usize>| windows.iter().map(|i| series[*i]).sum::<f64>() / windows.len().max(1) as f64;
+    bins(schedule, loudness).iter().map(mean).collect()
 }
 
 /// Variance of the sum of some windows, in order.

@@ -298,15 +298,15 @@ pub(super) struct Series<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Products {
     /// Log determinant of the covariance.
-    log_det: f64,
+    pub(super) log_det: f64,
     /// Number of windows.
-    count: f64,
+    pub(super) count: f64,
     /// Of the series with itself.
-    energy: f64,
+    pub(super) energy: f64,
     /// Of what is nuisance with the series, the constant first.
-    along: DVector<f64>,
+    pub(super) along: DVector<f64>,
     /// Of what is nuisance with itself.
-    nuisance: DMatrix<f64>,
+    pub(super) nuisance: DMatrix<f64>,
 }
 
 impl Products {

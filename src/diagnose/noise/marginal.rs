@@ -24,7 +24,7 @@ const LEAST: usize = 4;
 const LANES: usize = 4;
 
 /// Amplitudes over which the slow part of a noise is marginalised, ng: most noises need no others than those above.
-fn amplitudes_ng(fitted: &AxisNoise) -> Vec<f64> {
+pub(super) fn amplitudes_ng(fitted: &AxisNoise) -> Vec<f64> {
     let step = std::f64::consts::SQRT_2;
     let [least, most] = [SLOW_AMPLITUDES_NG[0], SLOW_AMPLITUDES_NG[SLOW_AMPLITUDES_NG.len() - 1]];
     let below = successors(Some(least / step), |a| Some(a / step)).take_while(|a| *a > UNSEEN * fitted.white_ng);
@@ -39,7 +39,7 @@ fn amplitudes_ng(fitted: &AxisNoise) -> Vec<f64> {
 }
 
 /// Its correlation times, s: with that beyond the shortest or the longest where the fitted one is nearer to it.
-fn times_s(fitted: &AxisNoise) -> Vec<f64> {
+pub(super) fn times_s(fitted: &AxisNoise) -> Vec<f64> {
     let mut all = SLOW_TIMES_S.to_vec();
     let [shorter, longer] = BEYOND_S;
     if fitted.slow_tau_s < (shorter * SLOW_TIMES_S[0]).sqrt() {
@@ -52,6 +52,14 @@ fn times_s(fitted: &AxisNoise) -> Vec<f64> {
         through(&mut all, fitted.slow_tau_s);
     }
     all
+}
+
+/// Log shares of the prior of amplitudes: each has what lies half way to those beside it.
+pub(super) fn shares(amplitudes_ng: &[f64]) -> Vec<f64> {
+    let last = amplitudes_ng.len() - 1;
+    let width = |a: usize| 0.5 * (amplitudes_ng[(a + 1).min(last)] / amplitudes_ng[a.saturating_sub(1)]).ln();
+    let whole = (amplitudes_ng[last] / amplitudes_ng[0]).ln();
+    (0..=last).map(|a| (width(a) / whole).ln()).collect()
 }
 
 /// Moves values by the ratio that puts the nearest of them at another.

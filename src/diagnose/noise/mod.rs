@@ -11,6 +11,7 @@
 
 mod binned;
 mod filter;
+mod flicker;
 mod levels;
 mod loudness;
 mod marginal;
@@ -18,6 +19,7 @@ mod marginal;
 pub use binned::{BIN_S, Binned};
 pub use filter::Whitener;
 use filter::{Series, products};
+pub use flicker::where_it_may_be_flicker;
 pub use levels::{Contradicted, settled};
 pub use loudness::Loudness;
 pub use marginal::{SlowPart, slow_part_marginalised};

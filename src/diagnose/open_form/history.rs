@@ -65,6 +65,13 @@ pub(super) fn terminator(c: &mut Collector) {
     }
 }
 
+/// Whether no more than one of the instants can be seen in the record, at which something begins and dies away within `tau_s`. What begins
+/// once is the catalogue's own leak or step, whatever the log says of the instant.
+fn begins_once(s: &Scene, instants: &[(f64, f64)], tau_s: f64) -> bool {
+    let [start, end] = s.span_s();
+    instants.iter().filter(|(t, _)| *t < end && t + 3.0 * tau_s > start).count() <= 1
+}
+
 pub(super) fn events(c: &mut Collector) {
     let s = c.scene;
     let mut kinds: Vec<&str> = s.case.events.iter().map(|e| e.kind.as_str()).collect();
@@ -75,18 +82,16 @@ pub(super) fn events(c: &mut Collector) {
         let starts: Vec<(f64, f64)> = spans.iter().map(|x| (x[0], 1.0)).collect();
         let ends: Vec<(f64, f64)> = spans.iter().map(|x| (x[1], 1.0)).collect();
         for tau in [200.0, 600.0, 2000.0, 6000.0] {
-            c.windows(
-                format!("exp(-(time since start of {kind})/{tau:.0} s)"),
-                "time_since_event",
-                "after logged events",
-                since(s, &starts, tau),
-            );
-            c.windows(
-                format!("exp(-(time since end of {kind})/{tau:.0} s)"),
-                "time_since_event",
-                "after logged events",
-                since(s, &ends, tau),
-            );
+            for (what, list) in
+                [("start", &starts), ("end", &ends)].iter().filter(|(_, list)| !begins_once(s, list, tau))
+            {
+                c.windows(
+                    format!("exp(-(time since {what} of {kind})/{tau:.0} s)"),
+                    "time_since_event",
+                    "after logged events",
+                    since(s, list, tau),
+                );
+            }
         }
         for lag in [120.0, 300.0, 900.0, 2700.0] {
             let late: Vec<[f64; 2]> = spans.iter().map(|x| [x[0] + lag, x[1] + lag]).collect();
@@ -101,8 +106,11 @@ pub(super) fn events(c: &mut Collector) {
         for (what, list) in [("start", &starts), ("end", &ends)] {
             c.family("time_since_event", "between logged events", ramps(s, kind, what, list));
         }
-        let count: Vec<f64> = s.clock_s().iter().map(|t| starts.iter().filter(|x| x.0 <= *t).count() as f64).collect();
-        c.windows(format!("number of {kind} so far"), "time_since_event", "after logged events", count);
+        if !begins_once(s, &starts, 0.0) {
+            let so_far = |t: &f64| starts.iter().filter(|x| x.0 <= *t).count() as f64;
+            let count = s.clock_s().iter().map(so_far).collect();
+            c.windows(format!("number of {kind} so far"), "time_since_event", "after logged events", count);
+        }
         if !matches!(kind, "water_dump" | "evaporator" | "thruster" | "crew_sleep") {
             c.windows(
                 format!("{kind} lasts"),
@@ -118,7 +126,7 @@ pub(super) fn events(c: &mut Collector) {
     let level = 8.0 * sorted[sorted.len() / 2] + 1e-7;
     let ends: Vec<(f64, f64)> =
         crossings(&s.grid_s, &speed, level).into_iter().filter(|x| x.1 < 0.0).map(|x| (x.0, 1.0)).collect();
-    for tau in [300.0, 1000.0, 3000.0, 10_000.0] {
+    for tau in [300.0, 1000.0, 3000.0, 10_000.0].into_iter().filter(|tau| !begins_once(s, &ends, *tau)) {
         c.windows(
             format!("exp(-(time since manoeuvre)/{tau:.0} s)"),
             "time_since_manoeuvre",
@@ -139,6 +147,9 @@ fn echoes(c: &mut Collector, kind: &str, ends: &[(f64, f64)]) {
         let step = if ends.len() > OFTEN { 2.0 * step } else { step };
         for delay in (1..).map(|i| step * f64::from(i)).take_while(|delay| *delay < 6100.0) {
             let late: Vec<(f64, f64)> = ends.iter().map(|x| (x.0 + delay, 1.0)).collect();
+            if begins_once(s, &late, tau) {
+                continue;
+            }
             let pushes = if ends.len() > OFTEN { since(s, &late, tau) } else { added(s, &late, tau) };
             members.push((format!("exp(-(time since {delay:.0} s after {kind})/{tau:.0} s)"), pushes));
         }

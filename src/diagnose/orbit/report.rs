@@ -278,9 +278,12 @@ fn fit(problem: &Problem, first: &Level, last: &Level) -> Fit {
         ([Some(before), Some(after)], _) => {
             Some(held_out(problem, "what follows fit_hours, predicted; median of the arcs, 3-D", before, after))
         }
-        (_, [Some(before), Some(after)]) => {
-            Some(held_out(problem, "the second half of each arc, from its first; median of the arcs, 3-D", before, after))
-        }
+        (_, [Some(before), Some(after)]) => Some(held_out(
+            problem,
+            "the second half of each arc, from its first; median of the arcs, 3-D",
+            before,
+            after,
+        )),
         _ => None,
     };
     Fit { noise_floor: vec![problem.sigma_m; 3], before: level(first), after: level(last), held_out }

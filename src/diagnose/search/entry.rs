@@ -1,12 +1,9 @@
 //! What is searched: a catalogue effect or an open form, at its starting points, with its priors. Not here: whitening, and which is best.
 
-use crate::diagnose::catalogue::{Effect, LOG_PRIOR, Nonlinear, Shape, Theta};
+use crate::diagnose::catalogue::{Effect, LOG_PRIOR, Nonlinear, Shape, Theta, USUAL_OR_SMALL};
 use crate::diagnose::open_form::SIZE_NG;
 use crate::diagnose::scene::Scene;
 use crate::math::shared_work;
-
-/// Size of a small effect, of its usual size.
-const SMALL: f64 = 0.2;
 
 /// What a family is.
 #[derive(Clone, Copy)]
@@ -66,12 +63,9 @@ impl Entry {
         }
     }
 
-    /// What the prior sizes may be multiplied by, each as likely: an effect is of its usual size or well below it.
+    /// What the prior sizes may be multiplied by, each as likely.
     pub(super) fn scales(&self) -> &'static [f64] {
-        match self.family {
-            Family::Listed(effect) if effect.linear.is_empty() || effect.linear.iter().any(|l| l.whole) => &[1.0],
-            _ => &[1.0, SMALL],
-        }
+        self.effect().map_or(USUAL_OR_SMALL, |effect| effect.scales)
     }
 
     /// Usual size of coefficient `k` where nothing is believed of it beforehand.

@@ -96,7 +96,11 @@ pub fn weigh_with_own_noise(
     refine(scene, &frame, entries, &mut set);
     let left = residual(scene, &frame, entries, &set);
     let slow = noise::slow_part_marginalised(&noise, &left, &scene.schedule, &scene.loudness);
-    let log_posterior =
-        frame.log_null + set.score + noise.iter().map(noise::log_prior_but_slow).sum::<f64>() + slow.above_fit;
+    let flicker = noise::where_it_may_be_flicker(&noise, &left, &scene.schedule, &scene.loudness);
+    let log_posterior = frame.log_null
+        + set.score
+        + noise.iter().map(noise::log_prior_but_slow).sum::<f64>()
+        + slow.above_fit
+        + flicker;
     Weighed { set, noise, log_posterior, slow_evidence: slow.above_none }
 }

@@ -9,9 +9,6 @@ use crate::diagnose::search::Weighed;
 use crate::diagnose::solve::{Library, Solution};
 use crate::diagnose::trial::Tried;
 
-/// Log odds by which an open form must beat the best listed set: its prior has made it pay already, and a name is not taken back for
-/// what a redrawn noise would turn around.
-const OPEN_MARGIN: f64 = 1.0;
 /// Log odds by which a set that cannot be believed must be above all that can, for those to be no explanation.
 const REFUSED_MARGIN: f64 = 3.0;
 /// A finding that fails its trial is still a mismatch when noise makes its evidence this much more rarely than a claim asks.
@@ -44,8 +41,7 @@ pub fn judge<'a>(
     let [top, best, open] =
         [listed.first().copied(), solution.listed.first(), solution.open.first()].map(|w| (height(w), w));
     let refused = best.0 - top.0 > REFUSED_MARGIN;
-    // What is less likely than nothing at all is no name to be kept.
-    let open_wins = if top.0 > null { open.0 - top.0 > OPEN_MARGIN } else { open.0 > null };
+    let open_wins = open.0 > top.0.max(null);
     let claimed = probability <= EVIDENCE_SHARE * claim && best.0.max(open.0) > null;
     let (verdict, chosen) = match (claimed, open_wins, refused) {
         (false, _, _) => (Verdict::Consistent, None),
