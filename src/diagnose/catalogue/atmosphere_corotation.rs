@@ -25,3 +25,22 @@ pub const EFFECT: Effect = Effect {
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
     Some(Shape::Columns(vec![full(scene.measure(|i| scene.drag_ng[i] - scene.drag_at_rest(i)))]))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    #[test]
+    fn it_is_drag_in_turning_air_less_drag_in_air_at_rest() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        let [column] = &made::columns(&scene, &EFFECT, [0.0; 2])[..] else { panic!("one column") };
+        let drag = |t, turns| made::drag_ng(t, turns, Vector3::zeros());
+        made::is_everywhere(&scene, column, |t| drag(t, 1.0) - drag(t, 0.0));
+        // It pushes across the track, one way ascending and the other descending.
+        assert!(column[1].iter().any(|a| *a > 1.0) && column[1].iter().any(|a| *a < -1.0));
+    }
+}

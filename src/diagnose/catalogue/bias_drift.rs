@@ -40,3 +40,22 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let inside = theta[0] > TAU_RANGE_S[0].ln() && theta[0] < TAU_RANGE_S[1].ln();
     inside.then(|| Shape::scalar(&decay(scene.clock_s(), scene.case.simulation.clock_s[0], theta[0].exp())))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    #[test]
+    fn it_is_one_decay_from_the_beginning_of_the_simulation() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        let tau_s: f64 = 20_000.0;
+        let begins_s = scene.case.simulation.clock_s[0];
+        for (axis, column) in made::columns(&scene, &EFFECT, [tau_s.ln(), 0.0]).iter().enumerate() {
+            made::is_everywhere(&scene, column, |t| Vector3::ith(axis, (-(t - begins_s) / tau_s).exp()));
+        }
+    }
+}

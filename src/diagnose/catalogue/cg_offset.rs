@@ -32,3 +32,23 @@ fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
     let column = |axis: usize| full(scene.measure(|i| scene.tensor_s2(i).column(axis) / NANO_G_M_S2));
     Some(Shape::Columns((0..3).map(column).collect()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    /// Fixed to the local vertical at 300 km (effects.md, domain.md): nothing along the track, 136 ng/m across it, 409 ng/m along the radius.
+    #[test]
+    fn a_metre_weighs_as_published() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        let published_ng = [0.0, 136.0, -409.0];
+        for (axis, (column, size)) in made::columns(&scene, &EFFECT, [0.0; 2]).iter().zip(published_ng).enumerate() {
+            for k in 0..3 {
+                let expected = if k == axis { size } else { 0.0 };
+                assert!(column[k].iter().all(|a| (a - expected).abs() < 0.8), "{axis}, {k}: {}", column[k][100]);
+            }
+        }
+    }
+}

@@ -26,3 +26,24 @@ pub const EFFECT: Effect = Effect {
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
     Some(Shape::Columns(vec![full(scene.measure(|i| scene.drag_ng[i] * bulge::cos_psi(&scene.r_m[i], &scene.sun[i])))]))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    #[test]
+    fn it_is_the_drag_by_the_cosine_from_an_apex_thirty_degrees_east_of_the_sun() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        let [column] = &made::columns(&scene, &EFFECT, [0.0; 2])[..] else { panic!("one column") };
+        let sun = scene.sun[scene.sun.len() / 2];
+        let ascension = sun.y.atan2(sun.x) + 30_f64.to_radians();
+        let level = sun.x.hypot(sun.y);
+        let apex = Vector3::new(level * ascension.cos(), level * ascension.sin(), sun.z);
+        let cos_psi = |t| made::orbit(t).0.normalize().dot(&apex);
+        made::is_everywhere(&scene, column, |t| made::drag_ng(t, 1.0, Vector3::zeros()) * cos_psi(t));
+    }
+}

@@ -52,3 +52,23 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     };
     Some(Shape::Columns((0..3).map(column).collect()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    #[test]
+    fn it_is_a_lever_arm_from_the_logged_instant_on() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        let onset_s = 112_000.0;
+        assert_eq!((EFFECT.grid)(&scene), [[onset_s, 0.0]]);
+        let columns = made::columns(&scene, &EFFECT, [onset_s, 0.0]);
+        let [before, half, after] = [-50.0, 0.0, 50.0].map(|dt| made::at(&scene, &columns[2][2], onset_s + dt));
+        assert!(
+            before == 0.0 && (after + 409.0).abs() < 0.8 && (half / after - 0.5).abs() < 1e-6,
+            "{before} {half} {after}"
+        );
+    }
+}

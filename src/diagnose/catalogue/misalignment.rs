@@ -35,3 +35,20 @@ fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
     let columns: Vec<Raw> = vec![[None, plus(2), minus(1)], [minus(2), None, plus(0)], [plus(1), minus(0), None]];
     Some(Shape::Columns(columns))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    #[test]
+    fn it_is_what_is_modelled_crossed_with_the_turn() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        for (axis, column) in made::columns(&scene, &EFFECT, [0.0; 2]).iter().enumerate() {
+            made::is_everywhere(&scene, column, |t| made::simulated_ng(t).cross(&Vector3::ith(axis, 1.0)));
+        }
+    }
+}

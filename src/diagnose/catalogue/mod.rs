@@ -16,6 +16,8 @@ pub mod crew_activity;
 pub mod diurnal_bulge;
 pub mod evaporator_venting;
 pub mod gravity_gradient;
+#[cfg(test)]
+mod made;
 pub mod magnetic_sensitivity;
 pub mod mass_shift;
 pub mod misalignment;

@@ -28,3 +28,22 @@ fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
     let offset = scene.vehicle.sensor_offset_m;
     Some(Shape::Columns(vec![full(scene.measure(|i| scene.rotation_s2(i) * offset / NANO_G_M_S2))]))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    /// w x (w x r) of one turn an orbit about the pitch axis: towards that axis.
+    #[test]
+    fn it_is_centripetal_about_the_axis_of_a_steady_turn() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        let [column] = &made::columns(&scene, &EFFECT, [0.0; 2])[..] else { panic!("one column") };
+        let per_m = made::rate_rad_s().powi(2) / made::NG_M_S2;
+        let [x, _, z] = made::OFFSET_M;
+        made::is_everywhere(&scene, column, |_| Vector3::new(-x, 0.0, -z) * per_m);
+    }
+}

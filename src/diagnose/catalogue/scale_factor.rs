@@ -30,3 +30,21 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let axis = theta[0] as usize;
     Some(Shape::Columns(vec![std::array::from_fn(|k| (k == axis).then(|| scene.simulated_ng[k].clone()))]))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    #[test]
+    fn it_is_what_is_modelled_on_one_axis_and_nothing_on_the_others() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        for axis in 0..3 {
+            let [column] = &made::columns(&scene, &EFFECT, [axis as f64, 0.0])[..] else { panic!("one column") };
+            made::is_everywhere(&scene, column, |t| Vector3::ith(axis, made::simulated_ng(t)[axis]));
+        }
+    }
+}

@@ -34,3 +34,40 @@ fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
     };
     Some(Shape::Columns(vec![full(scene.measure(push))]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    /// P A / m per unit of coefficient, away from the Sun, and none behind the Earth's disc.
+    #[test]
+    fn it_pushes_away_from_the_sun_and_not_in_the_shadow() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        let [column] = &made::columns(&scene, &EFFECT, [0.0; 2])[..] else { panic!("one column") };
+        // The Sun moves by a thousandth of a radian in an hour and a half.
+        let sun_at = |t: f64| scene.sun[scene.grid_s.partition_point(|g| *g < t)];
+        let (mut sunlit, mut dark) = (0, 0);
+        for (i, t) in scene.clock_s().iter().enumerate() {
+            let ((r, ..), sun) = (made::orbit(*t), sun_at(*t));
+            let found = nalgebra::Vector3::from_fn(|k, _| column[k][i]);
+            let (behind, beside) = (r.dot(&sun), r.cross(&sun).norm());
+            // Away from the edges of the shadow, which windows of 50 s cross at 8 km/s.
+            if behind < 0.0 && beside < 6_150_000.0 {
+                dark += 1;
+                assert_eq!(found.norm(), 0.0, "{t}");
+            } else if behind > 0.0 || beside > 6_600_000.0 {
+                sunlit += 1;
+                let expected = made::mean_ng(*t, |t| {
+                    let s = made::orbit(t).2.transpose() * sun;
+                    let area: f64 = (0..3).map(|k| s[k].abs() * made::AREA_M2[k]).sum();
+                    -s * (4.56e-6 * area / made::MASS_KG / made::NG_M_S2)
+                });
+                // The kink of the area between points 20 s apart.
+                assert!((found - expected).norm() < 6e-3 * expected.norm(), "{t}: {found} {expected}");
+            }
+        }
+        assert!(sunlit > 300 && dark > 200, "{sunlit} {dark}");
+    }
+}

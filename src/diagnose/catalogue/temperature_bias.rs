@@ -90,3 +90,24 @@ fn assumes(scene: &Scene, theta: &Theta) -> Option<String> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    #[test]
+    fn it_is_the_temperature_as_late_as_its_lag() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        for lag_s in [0.0, 500.0] {
+            for (axis, column) in made::columns(&scene, &EFFECT, [lag_s, AS_IT_BEGINS]).iter().enumerate() {
+                made::is_everywhere(&scene, column, |t| Vector3::ith(axis, made::temperature_c(t - lag_s)));
+            }
+        }
+        assert!(assumes(&scene, &[500.0, AS_IT_BEGINS]).is_none(), "the log begins ten minutes before the record");
+        assert!(assumes(&scene, &[2000.0, AS_IT_BEGINS]).is_some_and(|said| said.contains("2000 s late")));
+    }
+}

@@ -63,3 +63,30 @@ fn about(scene: &Scene, theta: &Theta) -> Option<Shape> {
     }
     Some(Shape::Columns([along, cross].map(|column| full(scene.measure(|i| column[i]))).into()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    /// At the wind its columns are taken about they give the drag in that wind, whole.
+    #[test]
+    fn its_columns_give_the_drag_in_the_wind_they_are_taken_about() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        for [along, cross] in [[200.0, 0.0], [150.0, -250.0]] {
+            let [by_along, by_cross] = &made::columns(&scene, &EFFECT, [along, cross])[..] else {
+                panic!("two columns")
+            };
+            let whole = std::array::from_fn(|k| {
+                by_along[k].iter().zip(&by_cross[k]).map(|(a, c)| along * a + cross * c).collect()
+            });
+            made::is_everywhere(&scene, &whole, |t| {
+                // Along the track, and to the orbit's normal: to port.
+                let (_, _, body) = made::orbit(t);
+                let wind = body.column(0) * along - body.column(1) * cross;
+                made::drag_ng(t, 1.0, wind) - made::drag_ng(t, 1.0, nalgebra::Vector3::zeros())
+            });
+        }
+    }
+}

@@ -55,3 +55,20 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
         late.iter().zip(&scene.simulated_ng[k]).map(|(a, b)| a - b).collect()
     })))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    /// A clock that runs ahead labels late.
+    #[test]
+    fn it_is_what_was_modelled_before_less_what_is_modelled_now() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        for offset_s in [120.0, -45.0] {
+            let [column] = &made::columns(&scene, &EFFECT, [offset_s, 0.0])[..] else { panic!("one column") };
+            made::is_everywhere(&scene, column, |t| made::simulated_ng(t - offset_s) - made::simulated_ng(t));
+        }
+    }
+}

@@ -50,3 +50,23 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
         theta[0] > start && theta[0] < end - 300.0 && theta[1] > TAU_RANGE_S[0].ln() && theta[1] < TAU_RANGE_S[1].ln();
     inside.then(|| Shape::scalar(&decay(scene.clock_s(), theta[0], theta[1].exp())))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    #[test]
+    fn it_is_the_mean_over_each_window_of_a_decay_from_its_onset() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        let (onset_s, tau_s) = (107_010.0, 600.0_f64);
+        let columns = made::columns(&scene, &EFFECT, [onset_s, tau_s.ln()]);
+        // The mean of exp(-t/tau) over a window, by five thousand points.
+        for centre_s in [106_950.0, 107_000.0, 107_025.0, 107_400.0, 110_000.0] {
+            let point = |i: i32| centre_s - 25.0 + 0.01 * (f64::from(i) + 0.5) - onset_s;
+            let mean = (0..5000).map(point).filter(|t| *t > 0.0).map(|t| (-t / tau_s).exp()).sum::<f64>() / 5000.0;
+            assert!((made::at(&scene, &columns[0][0], centre_s) - mean).abs() < 1e-4, "{centre_s}");
+        }
+    }
+}

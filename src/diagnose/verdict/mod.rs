@@ -40,9 +40,10 @@ use super::solve::{Library, Solution};
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
 const EVIDENCE_SHARE: f64 = 0.8;
 /// What remains overturns an explanation when it has more than this share of the energy explained, and noise leaves as much so many
-/// times more rarely than where nothing was explained: a name that holds is not taken back for what one record in a thousand has.
+/// times more rarely than is asked where nothing was explained: odds of twenty, as of any second effect. A name that holds is not
+/// taken back for what one record in a thousand has.
 const REMAINS_SHARE: f64 = 0.03;
-const REMAINS_BESIDE: f64 = 0.25;
+const REMAINS_BESIDE: f64 = 0.05;
 
 /// Prior sizes are for weighing hypotheses. In what is told of a size they are so many times the usual, or they would draw one that is
 /// several times the usual towards it by a standard error; and bound only what the record cannot say at all.
