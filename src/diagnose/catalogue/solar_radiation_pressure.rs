@@ -64,8 +64,9 @@ mod tests {
                     let area: f64 = (0..3).map(|k| s[k].abs() * made::AREA_M2[k]).sum();
                     -s * (4.56e-6 * area / made::MASS_KG / made::NG_M_S2)
                 });
-                // The kink of the area between points 20 s apart.
-                assert!((found - expected).norm() < 6e-3 * expected.norm(), "{t}: {found} {expected}");
+                // Between points 20 s apart a cosine changes by 0.023; where it goes through nothing its modulus is out by a quarter
+                // of that at most, and 370 m^2 of it are 2 m^2 of 200.
+                assert!((found - expected).norm() < 0.011 * expected.norm(), "{t}: {found} {expected}");
             }
         }
         assert!(sunlit > 300 && dark > 200, "{sunlit} {dark}");
