@@ -39,11 +39,8 @@ mod tests {
     /// n^2 (x, y, -2 z) r fixed to the vertical, taken from what is felt: (x, y, -2 z) with z down.
     #[test]
     fn it_pulls_apart_along_the_vertical_and_together_across_it() {
-        let case = made::case();
-        let scene = Scene::new(&case).unwrap();
-        let [column] = &made::columns(&scene, &EFFECT, [0.0; 2])[..] else { panic!("one column") };
         let per_m = made::rate_rad_s().powi(2) / made::NG_M_S2;
         let [x, y, z] = made::OFFSET_M;
-        made::is_everywhere(&scene, column, |_| Vector3::new(x, y, -2.0 * z) * per_m);
+        made::gives(&EFFECT, [0.0; 2], 0, |_| Vector3::new(x, y, -2.0 * z) * per_m);
     }
 }

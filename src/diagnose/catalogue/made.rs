@@ -158,3 +158,22 @@ pub fn at(scene: &Scene, series: &[f64], clock_s: f64) -> f64 {
     let i = scene.clock_s().iter().position(|t| (t - clock_s).abs() < 1e-6).expect("a window there");
     series[i]
 }
+
+/// That column `n` of an effect at a theta is what is expected, everywhere.
+pub fn gives(effect: &Effect, theta: Theta, n: usize, expected_ng: impl Fn(f64) -> Vector3<f64>) {
+    let case = case();
+    let scene = Scene::new(&case).unwrap();
+    is_everywhere(&scene, &columns(&scene, effect, theta)[n], expected_ng);
+}
+
+/// That the push of an effect at a theta has these shares of itself in the windows centred there: (centre, share), on every axis alike.
+pub fn has_shares(effect: &Effect, theta: Theta, shares: &[(f64, f64)]) {
+    let case = case();
+    let scene = Scene::new(&case).unwrap();
+    for (axis, column) in columns(&scene, effect, theta).iter().enumerate() {
+        for (centre_s, share) in shares {
+            let found = at(&scene, &column[axis], *centre_s);
+            assert!((found - share).abs() < 1e-9, "axis {axis} at {centre_s}: {found} for {share}");
+        }
+    }
+}

@@ -45,10 +45,8 @@ mod tests {
 
     #[test]
     fn it_is_what_is_modelled_crossed_with_the_turn() {
-        let case = made::case();
-        let scene = Scene::new(&case).unwrap();
-        for (axis, column) in made::columns(&scene, &EFFECT, [0.0; 2]).iter().enumerate() {
-            made::is_everywhere(&scene, column, |t| made::simulated_ng(t).cross(&Vector3::ith(axis, 1.0)));
+        for axis in 0..3 {
+            made::gives(&EFFECT, [0.0; 2], axis, |t| made::simulated_ng(t).cross(&Vector3::ith(axis, 1.0)));
         }
     }
 }

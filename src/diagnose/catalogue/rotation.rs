@@ -39,11 +39,8 @@ mod tests {
     /// w x (w x r) of one turn an orbit about the pitch axis: towards that axis.
     #[test]
     fn it_is_centripetal_about_the_axis_of_a_steady_turn() {
-        let case = made::case();
-        let scene = Scene::new(&case).unwrap();
-        let [column] = &made::columns(&scene, &EFFECT, [0.0; 2])[..] else { panic!("one column") };
         let per_m = made::rate_rad_s().powi(2) / made::NG_M_S2;
         let [x, _, z] = made::OFFSET_M;
-        made::is_everywhere(&scene, column, |_| Vector3::new(-x, 0.0, -z) * per_m);
+        made::gives(&EFFECT, [0.0; 2], 0, |_| Vector3::new(-x, 0.0, -z) * per_m);
     }
 }

@@ -40,11 +40,8 @@ mod tests {
 
     #[test]
     fn it_is_what_is_modelled_on_one_axis_and_nothing_on_the_others() {
-        let case = made::case();
-        let scene = Scene::new(&case).unwrap();
         for axis in 0..3 {
-            let [column] = &made::columns(&scene, &EFFECT, [axis as f64, 0.0])[..] else { panic!("one column") };
-            made::is_everywhere(&scene, column, |t| Vector3::ith(axis, made::simulated_ng(t)[axis]));
+            made::gives(&EFFECT, [axis as f64, 0.0], 0, |t| Vector3::ith(axis, made::simulated_ng(t)[axis]));
         }
     }
 }

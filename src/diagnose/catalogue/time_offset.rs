@@ -64,11 +64,8 @@ mod tests {
     /// A clock that runs ahead labels late.
     #[test]
     fn it_is_what_was_modelled_before_less_what_is_modelled_now() {
-        let case = made::case();
-        let scene = Scene::new(&case).unwrap();
         for offset_s in [120.0, -45.0] {
-            let [column] = &made::columns(&scene, &EFFECT, [offset_s, 0.0])[..] else { panic!("one column") };
-            made::is_everywhere(&scene, column, |t| made::simulated_ng(t - offset_s) - made::simulated_ng(t));
+            made::gives(&EFFECT, [offset_s, 0.0], 0, |t| made::simulated_ng(t - offset_s) - made::simulated_ng(t));
         }
     }
 }
