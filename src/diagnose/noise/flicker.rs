@@ -182,7 +182,8 @@ mod tests {
         (schedule, loudness, residual)
     }
 
-    /// The mean over twelve records: a gain that is a fifth of a log unit wrong is one part in five of the evidence.
+    /// Twelve records each. Noise of one kind is likelier by x as the other in one record in x at most (Ville): a gain of six would be
+    /// one in four hundred.
     #[test]
     fn flicker_noise_gains_and_neither_an_autoregression_nor_quick_noise_alone_loses_more_than_its_share() {
         let gain = |times_s: &[f64], slow_ng: f64| -> Vec<f64> {
@@ -197,8 +198,11 @@ mod tests {
         let octaves: Vec<f64> = (0..10).map(|i| 300.0 * 2f64.powi(i)).collect();
         let [of_flicker, of_one, of_none] = [gain(&octaves, 60.0), gain(&[3000.0], 25.0), gain(&[], 0.0)];
         assert!(of_flicker.iter().filter(|gain| **gain > 1.0).count() > 6, "{of_flicker:?}");
-        assert!(of_one.iter().all(|gain| (least - 1e-9..0.7).contains(gain)), "{of_one:?}");
-        assert!(of_none.iter().all(|gain| (-0.1..0.3).contains(gain)), "{of_none:?}");
+        for of_another in [&of_one, &of_none] {
+            assert!(of_another.iter().all(|gain| (least - 1e-9..6.0).contains(gain)), "{of_another:?}");
+            let nearly_none = of_another.iter().filter(|gain| gain.abs() < 0.2).count();
+            assert!(nearly_none > 8, "{of_another:?}");
+        }
     }
 
     /// A dozen bins, the covariance of their means written out.
