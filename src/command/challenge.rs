@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use indicatif::{ProgressBar, ProgressStyle};
-use oare_ground::challenge::conceal::{Kind, Manner, effect, law};
+use oare_ground::challenge::conceal::{Kind, Manner, Wander, effect, law};
 use oare_ground::challenge::engine::Engine;
 use oare_ground::challenge::score::{Outcome, score};
 use oare_ground::challenge::{run, seal};
@@ -110,8 +110,13 @@ fn concealed(args: &Args, engine: &Engine) -> anyhow::Result<Option<Vec<Outcome>
         (true, Some(id)) if effect::IDS.contains(&id) => vec![Kind::One],
         (true, Some(_)) => vec![Kind::Unknown],
     };
-    let Args { hours, other_physics, smooth, flicker, bursts, dump, .. } = *args;
-    let manner = Manner { hours, other_physics, smooth, flicker, bursts, dump };
+    let Args { hours, other_physics, bursts, dump, .. } = *args;
+    let wander = match (args.smooth, args.flicker) {
+        (true, _) => Wander::Smooth,
+        (_, true) => Wander::Flicker,
+        _ => Wander::Autoregression,
+    };
+    let manner = Manner { hours, other_physics, wander, bursts, dump };
     let orders = run::plan(args.cases, args.seed, &kinds, manner, only);
     let progress = bar(orders.len(), "sealing");
     let seals = run::seal(&orders, &progress);

@@ -1,6 +1,6 @@
 //! Slow noise that no autoregression is, on concealed records.
 
-use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
+use oare_ground::challenge::conceal::{Kind, Manner, Order, Wander, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::{Settings, diagnose};
 
@@ -8,7 +8,7 @@ use oare_ground::diagnose::{Settings, diagnose};
 #[test]
 fn smooth_slow_noise_is_no_finding() {
     for seed in [1_180_002, 1_180_091, 1_180_165, 1_180_203] {
-        let manner = Manner { smooth: true, ..Manner::default() };
+        let manner = Manner { wander: Wander::Smooth, ..Manner::default() };
         let concealed = draw_order(&Order { kind: Kind::Slow, seed, only: None, manner });
         let answer = diagnose(&super::case(&concealed.files), &Settings::default()).unwrap();
         assert_eq!(answer.verdict, Verdict::Consistent, "{seed}: {answer:?}");
@@ -19,7 +19,7 @@ fn smooth_slow_noise_is_no_finding() {
 #[test]
 fn flicker_noise_is_no_finding() {
     for seed in [1_250_008, 1_250_043] {
-        let manner = Manner { flicker: true, ..Manner::default() };
+        let manner = Manner { wander: Wander::Flicker, ..Manner::default() };
         let concealed = draw_order(&Order { kind: Kind::Slow, seed, only: None, manner });
         let answer = diagnose(&super::case(&concealed.files), &Settings::default()).unwrap();
         assert_eq!(answer.verdict, Verdict::Consistent, "{seed}: {answer:?}");

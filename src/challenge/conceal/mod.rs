@@ -83,6 +83,18 @@ pub struct Order {
     pub manner: Manner,
 }
 
+/// Of what kind slow noise is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wander {
+    /// An autoregression.
+    Autoregression,
+    /// An autoregression seen through three lags of its own memory: its spectrum falls as the eighth power of frequency where that of
+    /// an autoregression falls as the square.
+    Smooth,
+    /// Flicker noise: as many autoregressions of equal power as there are octaves from five minutes to three days.
+    Flicker,
+}
+
 /// What a flight has that the analyser is not told of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Manner {
@@ -90,11 +102,8 @@ pub struct Manner {
     pub hours: u32,
     /// Winds, density waves and panels of its own.
     pub other_physics: bool,
-    /// Slow noise, where there is some, is smooth: its spectrum falls as the eighth power of frequency where that of an autoregression
-    /// falls as the square.
-    pub smooth: bool,
-    /// Slow noise, where there is some, is flicker noise: of the same power in every octave from five minutes to three days, 60 ng at most.
-    pub flicker: bool,
+    /// Of what kind slow noise is, where there is some.
+    pub wander: Wander,
     /// Bursts in the noise, which the SNR does not know of.
     pub bursts: bool,
     /// The recording is a dump of the payload recorder: the simulator's instrument feels what the flight has, calibrates itself, and
@@ -105,7 +114,7 @@ pub struct Manner {
 impl Default for Manner {
     /// As the open cases are.
     fn default() -> Self {
-        Self { hours: 36, other_physics: false, smooth: false, flicker: false, bursts: false, dump: false }
+        Self { hours: 36, other_physics: false, wander: Wander::Autoregression, bursts: false, dump: false }
     }
 }
 
@@ -260,8 +269,11 @@ impl Question {
     fn written(self, rng: &mut ChaCha12Rng, order: &Order) -> Concealed {
         let mut suffix = String::new();
         suffix += if order.manner.other_physics { "-other" } else { "" };
-        suffix += if order.manner.smooth { "-smooth" } else { "" };
-        suffix += if order.manner.flicker { "-flicker" } else { "" };
+        suffix += match order.manner.wander {
+            Wander::Autoregression => "",
+            Wander::Smooth => "-smooth",
+            Wander::Flicker => "-flicker",
+        };
         suffix += if order.manner.bursts { "-bursts" } else { "" };
         suffix += if order.manner.dump { "-dump" } else { "" };
         let id = format!("{}-{:06}{suffix}", order.kind.word(), order.seed);

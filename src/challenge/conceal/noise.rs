@@ -6,8 +6,8 @@
 
 use rand_chacha::ChaCha12Rng;
 
-use super::Manner;
 use super::draw::{between, log_between, normal};
+use super::{Manner, Wander};
 use crate::diagnose::case::WINDOW_STRIDE_S;
 
 /// What the noise of one record is.
@@ -31,16 +31,8 @@ pub struct Noise {
     pub bursts: bool,
 }
 
-/// Of what kind slow noise is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Wander {
-    /// An autoregression.
-    Autoregression,
-    /// An autoregression seen through three lags of its own memory.
-    Smooth,
-    /// Flicker noise: as many autoregressions of equal power as there are octaves from five minutes to three days.
-    Flicker,
-}
+/// Largest deviation of slow noise, ng, as the acceptance has it.
+const SLOW_NG: f64 = 30.0;
 
 /// Share of half windows that are bursts, and how much louder they are.
 const BURSTS: [f64; 2] = [0.01, 10.0];
@@ -50,13 +42,8 @@ impl Noise {
     pub fn draw(rng: &mut ChaCha12Rng, slow: bool, manner: Manner) -> Self {
         let x_ng = log_between(rng, 55.0, 330.0);
         let awake_ng = [x_ng, x_ng * between(rng, 0.45, 0.50), x_ng * between(rng, 0.56, 0.62)];
-        let largest_ng = if manner.flicker { FLICKER_NG } else { 30.0 };
+        let largest_ng = if manner.wander == Wander::Flicker { FLICKER_NG } else { SLOW_NG };
         let slow_ng = std::array::from_fn(|_| if slow { between(rng, 5.0, largest_ng) } else { 0.0 });
-        let wander = match (manner.smooth, manner.flicker) {
-            (_, true) => Wander::Flicker,
-            (true, false) => Wander::Smooth,
-            (false, false) => Wander::Autoregression,
-        };
         Self {
             awake_ng,
             asleep: between(rng, 0.55, 0.68),
@@ -64,7 +51,7 @@ impl Noise {
             red_s: log_between(rng, 100.0, 500.0),
             slow_ng,
             slow_s: log_between(rng, 300.0, 10_800.0),
-            wander,
+            wander: manner.wander,
             bursts: manner.bursts,
         }
     }
@@ -137,7 +124,8 @@ impl Noise {
 const LAGS: usize = 3;
 const MEMORIES: f64 = 3.5;
 
-/// Octaves of flicker noise, the shortest correlation time, s, and its largest deviation in all of them, ng.
+/// Octaves of flicker noise, the shortest correlation time, s, and its largest deviation, ng, twice that of other slow noise because it is
+/// shared by them all.
 const OCTAVES: usize = 10;
 const SHORTEST_S: f64 = 300.0;
 const FLICKER_NG: f64 = 60.0;
@@ -286,9 +274,8 @@ mod tests {
     #[test]
     fn smooth_slow_noise_has_the_size_and_the_memory_that_are_said() {
         let mut rng = ChaCha12Rng::seed_from_u64(2);
-        let manner = Manner { smooth: true, ..Manner::default() };
+        let manner = Manner { wander: Wander::Smooth, ..Manner::default() };
         let noise = Noise { slow_ng: [20.0; 3], slow_s: 1000.0, ..Noise::draw(&mut rng, true, manner) };
-        assert_eq!(noise.wander, Wander::Smooth);
         let windows = 400_000;
         let series = noise.slow_series(&mut rng, 0, windows);
         let at = |lag: usize| series.iter().zip(&series[lag..]).map(|(a, b)| a * b).sum::<f64>() / windows as f64;
@@ -304,7 +291,7 @@ mod tests {
     #[test]
     fn flicker_noise_has_the_size_that_is_said_and_as_much_of_it_in_every_octave() {
         let mut rng = ChaCha12Rng::seed_from_u64(3);
-        let manner = Manner { flicker: true, ..Manner::default() };
+        let manner = Manner { wander: Wander::Flicker, ..Manner::default() };
         let noise = Noise { slow_ng: [20.0; 3], ..Noise::draw(&mut rng, true, manner) };
         let series = noise.slow_series(&mut rng, 0, 1_500_000);
         let variance = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64;

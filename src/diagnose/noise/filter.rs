@@ -299,7 +299,7 @@ pub(super) struct Series<'a> {
 pub(super) struct Products {
     /// Log determinant of the covariance.
     pub(super) log_det: f64,
-    /// Number of windows.
+    /// Number of values.
     pub(super) count: f64,
     /// Of the series with itself.
     pub(super) energy: f64,

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::binned::{BIN_S, Binned, means};
 use super::filter::Products;
-use super::marginal::{amplitudes_ng, shares, times_s};
+use super::marginal::{amplitudes_ng, times_s, widths};
 use super::{AxisNoise, Loudness, Schedule};
 use crate::math::shared_work;
 
@@ -17,7 +17,8 @@ use crate::math::shared_work;
 /// each to the next.
 const TIMES_S: [f64; 5] = [600.0, 2400.0, 9600.0, 38_400.0, 153_600.0];
 const KINDS: usize = TIMES_S.len();
-/// Share of sensors whose slow noise is taken for flicker noise before anything is seen.
+/// Share of sensors whose slow noise is taken for flicker noise before anything is seen: nobody has counted them. At a tenth flicker noise
+/// must show itself by odds of ten, and where it does not, evidence changes by a tenth.
 const SHARE: f64 = 0.1;
 /// Fewest bins: in less than three hours the slow octaves do not show.
 const BINS_MIN: usize = 30;
@@ -52,12 +53,12 @@ fn flicker_above_autoregression(
     let shared: Vec<Vec<f64>> = shared_ng.iter().map(|error| means(error, schedule, loudness)).collect();
     let series = Series { binned: &binned, shared: &shared };
     let amplitudes_ng = amplitudes_ng(noise);
-    let shares = shares(&amplitudes_ng);
     let times_s = times_s(noise);
     let mut autoregressions = Vec::with_capacity(amplitudes_ng.len() * times_s.len());
     let mut flickers = Vec::with_capacity(amplitudes_ng.len());
-    for (slow_ng, share) in amplitudes_ng.iter().zip(&shares) {
-        let variance = slow_ng * slow_ng;
+    for (slow_ng, width) in amplitudes_ng.iter().zip(widths(&amplitudes_ng)) {
+        // Both kinds are marginalised over the same amplitudes, so that what those stand for in all is not asked.
+        let (variance, share) = (slow_ng * slow_ng, width.ln());
         let of_one = |tau_s: &f64| share - (times_s.len() as f64).ln() + series.log_likelihood([*tau_s], variance);
         autoregressions.extend(times_s.iter().map(of_one));
         flickers.push(share + series.log_likelihood(TIMES_S, variance / KINDS as f64));

@@ -54,12 +54,11 @@ pub(super) fn times_s(fitted: &AxisNoise) -> Vec<f64> {
     all
 }
 
-/// Log shares of the prior of amplitudes: each has what lies half way to those beside it.
-pub(super) fn shares(amplitudes_ng: &[f64]) -> Vec<f64> {
+/// What each amplitude stands for on the axis of logarithms: what lies half way to those beside it.
+pub(super) fn widths(amplitudes_ng: &[f64]) -> Vec<f64> {
     let last = amplitudes_ng.len() - 1;
     let width = |a: usize| 0.5 * (amplitudes_ng[(a + 1).min(last)] / amplitudes_ng[a.saturating_sub(1)]).ln();
-    let whole = (amplitudes_ng[last] / amplitudes_ng[0]).ln();
-    (0..=last).map(|a| (width(a) / whole).ln()).collect()
+    (0..=last).map(width).collect()
 }
 
 /// Moves values by the ratio that puts the nearest of them at another.
@@ -95,9 +94,7 @@ pub fn slow_part_marginalised(
     for (k, noise) in noise.iter().enumerate() {
         trials.push((k, *noise, f64::NAN));
         let (amplitudes_ng, times_s) = (amplitudes_ng(noise), times_s(noise));
-        for (a, slow_ng) in amplitudes_ng.iter().enumerate() {
-            let [before, after] = [a.saturating_sub(1), (a + 1).min(amplitudes_ng.len() - 1)];
-            let share = 0.5 * (amplitudes_ng[after] / amplitudes_ng[before]).ln();
+        for (slow_ng, share) in amplitudes_ng.iter().zip(widths(&amplitudes_ng)) {
             trials.extend(
                 times_s.iter().map(|tau_s| (k, AxisNoise { slow_ng: *slow_ng, slow_tau_s: *tau_s, ..*noise }, share)),
             );

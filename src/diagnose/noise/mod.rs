@@ -7,7 +7,8 @@
 //! have a variance of their own (see [`Loudness`]).
 //!
 //! The amplitude of the slow part is estimated on a logarithmic scale with a prior: it never reaches zero, and a
-//! record too short to exclude slow noise is treated as having some. That is what keeps false leaks away.
+//! record too short to exclude slow noise is treated as having some. That is what keeps false leaks away. A hypothesis is weighed
+//! with its slow part marginalised, and with the possibility that it is no autoregression but flicker noise (see `flicker`).
 
 mod binned;
 mod filter;

@@ -27,6 +27,8 @@ const FIRST_REVOLUTIONS: f64 = 0.3;
 const GROWTH: f64 = 4.0;
 /// Fewest epochs of such a fit.
 const FIRST_EPOCHS: usize = 6;
+/// Fewest epochs of an arc, or of a part of one that is to say something of the rest: twice as many coordinates as there may be unknowns.
+pub(super) const EPOCHS_MIN: usize = 12;
 /// Positions that change by less than this between iterations have converged, m.
 const CONVERGED_M: f64 = 1e-4;
 
@@ -81,8 +83,8 @@ impl Arc {
         let inertial = |(t, r): (&f64, &Vector3<f64>)| environment.rotation.to_inertial(*t, r);
         let observed_m: Vec<_> = track.t_s.iter().zip(&track.fixed_m).map(inertial).collect();
         let fitted = track.t_s.partition_point(|t| *t <= fit_s);
-        if fitted < 12 {
-            return Err(OrbitError::TooFew { id: track.id.clone(), found: fitted, expected: 12 });
+        if fitted < EPOCHS_MIN {
+            return Err(OrbitError::TooFew { id: track.id.clone(), found: fitted, expected: EPOCHS_MIN });
         }
         let start = first_state(&track.t_s, &observed_m, environment.field.gm_m3_s2());
         // The fastest part of the orbit sets the step.
@@ -305,6 +307,18 @@ impl ArcFit {
         let rms = (self.residuals_m[epochs].iter().map(|r| r.norm_squared()).sum::<f64>() / n).sqrt();
         // An orbit that could not be followed is infinitely far off.
         if rms.is_nan() { f64::INFINITY } else { rms }
+    }
+
+    /// Places in `partials` of the columns of all that was fitted, but for terms that `keep` leaves out: the state, the velocity step, the
+    /// coefficients.
+    pub(super) fn fitted_columns(&self, keep: impl Fn(Term) -> bool) -> Vec<usize> {
+        let active: usize = self.coefficients.iter().map(|(term, _)| term.parameters().len()).sum();
+        let mut used: Vec<usize> = (0..6).collect();
+        if self.impulse.is_some() {
+            used.extend(self.partials.ncols() - 4..self.partials.ncols());
+        }
+        used.extend((0..active).filter(|j| keep(self.columns[*j].0)).map(|j| 6 + j));
+        used
     }
 
     /// Coefficients of a fitted term.

@@ -1,36 +1,25 @@
 //! What the first half of an arc says of the second, where the recording leaves nothing beyond the fit to predict. Not here: the
 //! prediction of what follows `fit_hours`, which the fit itself flies on to (see `search`).
 
-use nalgebra::DVector;
-
-use super::arc::{Arc, ArcFit, solve};
-use super::search::{Level, Problem};
+use super::arc::{Arc, ArcFit, EPOCHS_MIN, solve};
+use super::search::{Level, Problem, residual};
 use crate::diagnose::measured::spread::median;
-
-/// Epochs of a half, at least: as many as an arc needs to be fitted at all.
-const EPOCHS_MIN: usize = 12;
 
 /// Rms of the 3-D residual over the second half of an arc, m, when its state and the coefficients of its level are fitted to the
 /// first half alone: linear about the fit of the whole arc, from which neither half is far. None where the halves are too short,
 /// or where a velocity step in the second half is what no first half can know.
-pub fn second_half_predicted_m(arc: &Arc, fit: &ArcFit) -> Option<f64> {
+fn second_half_predicted_m(arc: &Arc, fit: &ArcFit) -> Option<f64> {
     let (first, last) = (arc.t_s[0], arc.t_s[arc.fitted - 1]);
     let middle = 0.5 * (first + last);
     let half = arc.t_s[..arc.fitted].partition_point(|t| *t <= middle);
     if half < EPOCHS_MIN || arc.fitted - half < EPOCHS_MIN || fit.impulse.is_some_and(|kick| kick.at_s > middle) {
         return None;
     }
-    let active: usize = fit.coefficients.iter().map(|(term, _)| term.parameters().len()).sum();
-    let mut used: Vec<usize> = (0..6 + active).collect();
-    if fit.impulse.is_some() {
-        used.extend(fit.partials.ncols() - 4..fit.partials.ncols());
-    }
-    let rows = |from: usize, to: usize| fit.partials.rows(3 * from, 3 * (to - from)).select_columns(&used);
-    let residual = |from: usize, to: usize| {
-        DVector::from_iterator(3 * (to - from), fit.residuals_m[from..to].iter().flat_map(|r| [r.x, r.y, r.z]))
-    };
-    let step = solve(&rows(0, half), &residual(0, half))?;
-    let left = residual(half, arc.fitted) - rows(half, arc.fitted) * step;
+    let (seen, unseen) = (3 * half, 3 * (arc.fitted - half));
+    let design = fit.partials.rows(0, seen + unseen).select_columns(&fit.fitted_columns(|_| true));
+    let residual = residual(arc, fit);
+    let step = solve(&design.rows(0, seen).into_owned(), &residual.rows(0, seen).into_owned())?;
+    let left = residual.rows(seen, unseen) - design.rows(seen, unseen) * step;
     let rms = (left.norm_squared() / (arc.fitted - half) as f64).sqrt();
     rms.is_finite().then_some(rms)
 }

@@ -272,20 +272,13 @@ fn fit(problem: &Problem, first: &Level, last: &Level) -> Fit {
         let whitened_chi2_per_dof = rms_total * rms_total / (3.0 * problem.sigma_m * problem.sigma_m);
         FitLevel { rms: axis_rms(problem, level), rms_total, whitened_chi2_per_dof }
     };
-    let beyond = [first, last].map(|level| problem.median_predicted_m(level));
-    let halves = [first, last].map(|level| median_second_half_m(problem, level));
-    let held_out = match (beyond, halves) {
-        ([Some(before), Some(after)], _) => {
-            Some(held_out(problem, "what follows fit_hours, predicted; median of the arcs, 3-D", before, after))
-        }
-        (_, [Some(before), Some(after)]) => Some(held_out(
-            problem,
-            "the second half of each arc, from its first; median of the arcs, 3-D",
-            before,
-            after,
-        )),
-        _ => None,
-    };
+    let on = |scheme: &str, of: &dyn Fn(&Level) -> Option<f64>| Some(held_out(problem, scheme, of(first)?, of(last)?));
+    let held_out =
+        on("what follows fit_hours, predicted; median of the arcs, 3-D", &|level| problem.median_predicted_m(level))
+            .or_else(|| {
+                let scheme = "the second half of each arc, from its first; median of the arcs, 3-D";
+                on(scheme, &|level| median_second_half_m(problem, level))
+            });
     Fit { noise_floor: vec![problem.sigma_m; 3], before: level(first), after: level(last), held_out }
 }
 

@@ -250,12 +250,7 @@ struct Projected {
 fn rows_of(arc: &Arc, fit: &ArcFit, keep: impl Fn(Term) -> bool, wanted: Term) -> Projected {
     let rows = 3 * arc.fitted;
     let all = fit.partials.rows(0, rows);
-    let active: usize = fit.coefficients.iter().map(|(term, _)| term.parameters().len()).sum();
-    let mut base: Vec<usize> = (0..6).collect();
-    if fit.impulse.is_some() {
-        base.extend(fit.partials.ncols() - 4..fit.partials.ncols());
-    }
-    base.extend((0..active).filter(|j| keep(fit.columns[*j].0)).map(|j| 6 + j));
+    let base = fit.fitted_columns(keep);
     let of_wanted: Vec<usize> =
         fit.columns.iter().enumerate().filter(|(_, (term, _))| *term == wanted).map(|(j, _)| 6 + j).collect();
     let mut design = all.select_columns(&base);
