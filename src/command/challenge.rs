@@ -41,6 +41,9 @@ pub struct Args {
     /// The noise of records with slow noise is flicker noise: of the same power in every octave, up to 60 ng.
     #[arg(long, conflicts_with = "smooth")]
     flicker: bool,
+    /// The noise of records with slow noise resonates on every axis about a period of its own, up to 60 ng.
+    #[arg(long, conflicts_with_all = ["smooth", "flicker"])]
+    resonant: bool,
     /// One half window in a hundred is ten times as loud; the SNR does not know of it.
     #[arg(long)]
     bursts: bool,
@@ -111,9 +114,10 @@ fn concealed(args: &Args, engine: &Engine) -> anyhow::Result<Option<Vec<Outcome>
         (true, Some(_)) => vec![Kind::Unknown],
     };
     let Args { hours, other_physics, bursts, dump, .. } = *args;
-    let wander = match (args.smooth, args.flicker) {
-        (true, _) => Wander::Smooth,
-        (_, true) => Wander::Flicker,
+    let wander = match (args.smooth, args.flicker, args.resonant) {
+        (true, _, _) => Wander::Smooth,
+        (_, true, _) => Wander::Flicker,
+        (_, _, true) => Wander::Resonant,
         _ => Wander::Autoregression,
     };
     let manner = Manner { hours, other_physics, wander, bursts, dump };

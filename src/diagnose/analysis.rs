@@ -4,10 +4,10 @@
 
 use super::answer::{Diagnosis, Source};
 use super::bootstrap::{Bootstrap, Reached};
-use super::bursts::solve_beside_bursts;
 use super::case::Case;
 use super::error::CaseError;
 use super::null_table;
+use super::order::solve_at_its_order;
 use super::plates::plates;
 use super::report::Plates;
 use super::scene::Scene;
@@ -80,7 +80,7 @@ impl<'a> Prepared<'a> {
         let mut scene = Scene::new(case)?;
         let (library, noise) =
             shared_work::both(|| Library::new(&scene, &settings.without), || null_noise(&scene, None));
-        let Some(solution) = solve_beside_bursts(&mut scene, &library, noise, &|| false) else {
+        let Some(solution) = solve_at_its_order(&mut scene, &library, noise, &|| false) else {
             unreachable!("nobody asked to stop")
         };
         let statistic = solution.proven(&scene, &library.entries);

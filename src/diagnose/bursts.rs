@@ -60,8 +60,14 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    const NOISE: AxisNoise =
-        AxisNoise { white_ng: 100.0, short_ng: 20.0, short_tau_s: 120.0, slow_ng: 2.0, slow_tau_s: 3000.0 };
+    const NOISE: AxisNoise = AxisNoise {
+        white_ng: 100.0,
+        short_ng: 20.0,
+        short_tau_s: 120.0,
+        slow_ng: 2.0,
+        slow_tau_s: 3000.0,
+        resonance: None,
+    };
 
     fn record(bursts: &[usize]) -> (Schedule, Loudness, Vec<f64>) {
         let schedule = Schedule::new(&(0..4000).map(|i| 25.0 * f64::from(i)).collect::<Vec<f64>>());

@@ -14,11 +14,11 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::answer::{Diagnosis, Source, Verdict};
-use super::bursts::solve_beside_bursts;
 use super::case::{Case, Expectation, WINDOW_STRIDE_S, WINDOWS_MIN};
 use super::error::CaseError;
 use super::noise::AxisNoise;
 use super::null_table;
+use super::order::solve_at_its_order;
 use super::recorder::Usable;
 use super::report;
 use super::scene::{Scene, Surroundings};
@@ -231,8 +231,9 @@ impl Live {
             || Library::new(&scene, &self.policy.without),
             || null_noise(&scene, self.noise.as_ref()),
         );
-        let Some(solution) = solve_beside_bursts(&mut scene, &library, noise, stop) else { return false };
-        self.noise = Some(solution.null.noise);
+        let Some(solution) = solve_at_its_order(&mut scene, &library, noise, stop) else { return false };
+        // The order is chosen anew at every look.
+        self.noise = Some(solution.null.noise.map(|noise| AxisNoise { resonance: None, ..noise }));
         let log_odds = solution.proven(&scene, &library.entries);
         let clock_s = scene.clock_s();
         let proof = Proof {

@@ -1,9 +1,9 @@
 //! A recording against its simulation: the noise, where they differ, what was left out, how the fit improves.
 //!
 //! The way of a case: [`case`] (read, checked) -> [`scene`] (residual and physics) -> [`noise`] and [`design`] (whitened columns)
-//! -> [`catalogue`] and [`open_form`] (what may be missing) -> [`search`] and [`solve`] (sets, weighed) -> [`null_table`] or
-//! [`bootstrap`] (how surprising) -> [`trial`] (does it predict) -> [`verdict`] with [`model`] and [`locate`] (what is said) ->
-//! [`answer`], [`report`].
+//! -> [`catalogue`] and [`open_form`] (what may be missing) -> [`search`] and [`solve`] (sets, weighed), in [`order`] at the noise
+//! that the record asks for -> [`null_table`] or [`bootstrap`] (how surprising) -> [`trial`] (does it predict) -> [`verdict`] with
+//! [`model`] and [`locate`] (what is said) -> [`answer`], [`report`].
 
 pub mod analysis;
 pub mod answer;
@@ -24,6 +24,7 @@ pub mod null_table;
 pub mod open_form;
 mod optimise;
 pub mod orbit;
+pub mod order;
 mod plates;
 pub mod poses;
 pub mod recorder;

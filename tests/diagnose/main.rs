@@ -8,6 +8,7 @@ mod limits;
 mod listed;
 mod loud;
 mod odd;
+mod resonant;
 mod separating;
 mod smooth;
 mod trial;

@@ -93,6 +93,9 @@ pub enum Wander {
     Smooth,
     /// Flicker noise: as many autoregressions of equal power as there are octaves from five minutes to three days.
     Flicker,
+    /// An autoregression of the second order: it oscillates about a period of 200 s to 2000 s, each axis about its own, and forgets its phase
+    /// in half a period to three.
+    Resonant,
 }
 
 /// What a flight has that the analyser is not told of.
@@ -273,6 +276,7 @@ impl Question {
             Wander::Autoregression => "",
             Wander::Smooth => "-smooth",
             Wander::Flicker => "-flicker",
+            Wander::Resonant => "-resonant",
         };
         suffix += if order.manner.bursts { "-bursts" } else { "" };
         suffix += if order.manner.dump { "-dump" } else { "" };

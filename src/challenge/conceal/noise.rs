@@ -31,7 +31,7 @@ pub struct Noise {
     pub bursts: bool,
 }
 
-/// Largest deviation of slow noise, ng, as the acceptance has it.
+/// Largest deviation of slow noise, ng, as the acceptance has it: twice that of noise that shares it among octaves, or is quick beside it.
 const SLOW_NG: f64 = 30.0;
 
 /// Share of half windows that are bursts, and how much louder they are.
@@ -42,7 +42,10 @@ impl Noise {
     pub fn draw(rng: &mut ChaCha12Rng, slow: bool, manner: Manner) -> Self {
         let x_ng = log_between(rng, 55.0, 330.0);
         let awake_ng = [x_ng, x_ng * between(rng, 0.45, 0.50), x_ng * between(rng, 0.56, 0.62)];
-        let largest_ng = if manner.wander == Wander::Flicker { FLICKER_NG } else { SLOW_NG };
+        let largest_ng = match manner.wander {
+            Wander::Autoregression | Wander::Smooth => SLOW_NG,
+            Wander::Flicker | Wander::Resonant => 2.0 * SLOW_NG,
+        };
         let slow_ng = std::array::from_fn(|_| if slow { between(rng, 5.0, largest_ng) } else { 0.0 });
         Self {
             awake_ng,
@@ -124,11 +127,13 @@ impl Noise {
 const LAGS: usize = 3;
 const MEMORIES: f64 = 3.5;
 
-/// Octaves of flicker noise, the shortest correlation time, s, and its largest deviation, ng, twice that of other slow noise because it is
-/// shared by them all.
+/// Octaves of flicker noise, and the shortest correlation time, s.
 const OCTAVES: usize = 10;
 const SHORTEST_S: f64 = 300.0;
-const FLICKER_NG: f64 = 60.0;
+
+/// Periods of noise that resonates, s, and the time in which it forgets its phase, in periods.
+const PERIODS_S: [f64; 2] = [200.0, 2000.0];
+const FORGOTTEN: [f64; 2] = [0.5, 3.0];
 
 /// Slow noise of unit variance, window by window.
 enum Slow {
@@ -143,6 +148,8 @@ enum Slow {
     },
     /// Several of equal power.
     Flicker { keep: [f64; OCTAVES], states: [f64; OCTAVES] },
+    /// Of the second order: what it keeps of its last two values, those, and the deviation of what is new.
+    Resonant { keep: [f64; 2], states: [f64; 2], new: f64 },
 }
 
 impl Slow {
@@ -155,6 +162,21 @@ impl Slow {
                 keep: std::array::from_fn(|i| keep(SHORTEST_S * 2f64.powi(i as i32))),
                 states: std::array::from_fn(|_| normal(rng)),
             },
+            Wander::Resonant => {
+                let [shortest, longest] = PERIODS_S;
+                let period_s = log_between(rng, shortest, longest);
+                let forgotten_s = period_s * log_between(rng, FORGOTTEN[0], FORGOTTEN[1]);
+                let radius = keep(forgotten_s);
+                let [a, b] =
+                    [2.0 * radius * (std::f64::consts::TAU * WINDOW_STRIDE_S / period_s).cos(), -radius * radius];
+                // Variance of an autoregression of the second order beside that of what is new (Box and Jenkins 1976, section 3.2).
+                let new = ((1.0 + b) * ((1.0 - b).powi(2) - a * a) / (1.0 - b)).sqrt();
+                let mut slow = Self::Resonant { keep: [a, b], states: [0.0; 2], new };
+                for _ in 0..(10.0 * forgotten_s / WINDOW_STRIDE_S) as usize {
+                    slow.next(rng);
+                }
+                slow
+            }
             Wander::Smooth => {
                 let memory_s = noise.slow_s / MEMORIES;
                 let keep = keep(memory_s);
@@ -180,6 +202,10 @@ impl Slow {
                     *x = *keep * *x + (1.0 - *keep * *keep).sqrt() * normal(rng);
                 }
                 states.iter().sum::<f64>() / (OCTAVES as f64).sqrt()
+            }
+            Self::Resonant { keep, states, new } => {
+                *states = [keep[0] * states[0] + keep[1] * states[1] + *new * normal(rng), states[0]];
+                states[0]
             }
         }
     }
@@ -300,5 +326,27 @@ mod tests {
         assert!((variance(&series) / 400.0 - 1.0).abs() < 0.1, "{}", variance(&series));
         let kept = variance(&means) / variance(&series);
         assert!((0.6..0.75).contains(&kept), "{kept}");
+    }
+
+    /// Noise that resonates crosses zero twice a period or a little oftener: of the second order, by the arc cosine of what it is like itself
+    /// a window on (Rice 1944).
+    #[test]
+    fn noise_that_resonates_has_the_size_that_is_said_and_a_period_between_its_bounds() {
+        let manner = Manner { wander: Wander::Resonant, ..Manner::default() };
+        let mut periods_s = Vec::new();
+        for seed in 4..20 {
+            let mut rng = ChaCha12Rng::seed_from_u64(seed);
+            let noise = Noise { slow_ng: [20.0; 3], ..Noise::draw(&mut rng, true, manner) };
+            let series = noise.slow_series(&mut rng, 0, 200_000);
+            let n = series.len() as f64;
+            let variance = series.iter().map(|x| x * x).sum::<f64>() / n;
+            // Seven hundred times the longest memory: within a tenth by three standard errors.
+            assert!((variance / 400.0 - 1.0).abs() < 0.1, "{seed}: {variance}");
+            let crossings = series.windows(2).filter(|w| w[0] * w[1] < 0.0).count() as f64;
+            periods_s.push(2.0 * n * WINDOW_STRIDE_S / crossings);
+        }
+        assert!(periods_s.iter().all(|p| (100.0..2000.0).contains(p)), "{periods_s:?}");
+        let [least, most] = [f64::min, f64::max].map(|which| periods_s.iter().copied().reduce(which).unwrap());
+        assert!(most > 3.0 * least, "{periods_s:?}");
     }
 }

@@ -8,7 +8,8 @@ fn schedule() -> Schedule {
 
 /// A residual behind the filters of even noise with so much of a slow part.
 fn framed(slow_ng: f64, schedule: Schedule, residual_ng: &Axes) -> Frame {
-    let noise = AxisNoise { white_ng: 50.0, short_ng: 5.0, short_tau_s: 100.0, slow_ng, slow_tau_s: 3000.0 };
+    let noise =
+        AxisNoise { white_ng: 50.0, short_ng: 5.0, short_tau_s: 100.0, slow_ng, slow_tau_s: 3000.0, resonance: None };
     let loudness = std::array::from_fn(|_| Loudness::even(vec![1.0; schedule.len()]));
     Frame::new(&[noise; 3], &schedule, &loudness, residual_ng)
 }

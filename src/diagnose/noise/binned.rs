@@ -13,7 +13,7 @@ const WINDOWS_MIN: usize = 4;
 pub struct Binned {
     /// Means, ng.
     pub mean_ng: Vec<f64>,
-    /// Their variances by white and short noise, ng^2.
+    /// Their variances by white and short noise and by a resonance, ng^2.
     pub variance_ng2: Vec<f64>,
 }
 
@@ -81,13 +81,15 @@ pub(super) fn means(series: &[f64], schedule: &Schedule, loudness: &Loudness) ->
 /// Variance of the sum of some windows, in order.
 fn variance_of_sum(windows: &[usize], noise: &AxisNoise, schedule: &Schedule, activity: &[f64]) -> f64 {
     let [white, short] = [noise.white_ng.powi(2), noise.short_ng.powi(2)];
+    let oscillating = |apart_s: f64| noise.resonance.map_or(0.0, |r| r.rms_ng.powi(2) * r.turn(apart_s)[0]);
     let mut sum = 0.0;
     for (a, i) in windows.iter().enumerate() {
-        sum += activity[*i].powi(2) * (white + short);
+        sum += activity[*i].powi(2) * (white + short + oscillating(0.0));
         for j in &windows[a + 1..] {
             let apart = schedule.clock_s[*j] - schedule.clock_s[*i];
             let shared = if *j == i + 1 { schedule.overlap[*j][1] * schedule.overlap[*i][0] * white } else { 0.0 };
-            sum += 2.0 * activity[*i] * activity[*j] * (shared + short * (-apart / noise.short_tau_s).exp());
+            let short = short * (-apart / noise.short_tau_s).exp();
+            sum += 2.0 * activity[*i] * activity[*j] * (shared + short + oscillating(apart));
         }
     }
     sum
@@ -104,7 +106,14 @@ mod tests {
     fn means_scatter_as_their_variances_say_and_gaps_and_bursts_are_left_out() {
         let clock: Vec<f64> = (0..40_000).filter(|i| i % 190 > 20).map(|i| 25.0 * f64::from(i)).collect();
         let schedule = Schedule::new(&clock);
-        let noise = AxisNoise { white_ng: 100.0, short_ng: 25.0, short_tau_s: 90.0, slow_ng: 0.0, slow_tau_s: 3000.0 };
+        let noise = AxisNoise {
+            white_ng: 100.0,
+            short_ng: 25.0,
+            short_tau_s: 90.0,
+            slow_ng: 0.0,
+            slow_tau_s: 3000.0,
+            resonance: None,
+        };
         let mut loudness = Loudness::even((0..clock.len()).map(|i| if i > 15_000 { 0.6 } else { 1.2 }).collect());
         loudness.burst.iter_mut().step_by(50).for_each(|b| *b = 300.0);
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);

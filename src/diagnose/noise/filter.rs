@@ -1,56 +1,80 @@
-//! The whitening filter: a Kalman filter of three states, linear, the same for data and for every regressor.
+//! The whitening filter: a Kalman filter of three states, and of two more where there is a resonance; linear, the same for data and for
+//! every regressor.
 //!
 //! Every step of a filter needs the one before, so that one series after another waits for itself; several are taken side by side.
 
 use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
 
-use super::{AxisNoise, Loudness, Schedule, Stretch};
+use super::{AxisNoise, Loudness, Resonance, Schedule, Stretch};
 
-/// Gains of whitening filters side by side, one row a window.
+/// Gains of whitening filters side by side, one row a window; with `R` resonances, none or one, each of two states.
 #[derive(Debug, Clone, Copy)]
-struct Row<const L: usize> {
+struct Row<const L: usize, const R: usize> {
     h: [[f64; L]; 2],
     per_sd: [f64; L],
     gain: [[f64; L]; 3],
     decay: [[f64; L]; 2],
+    resonance_gain: [[[f64; L]; 2]; R],
+    turn: [[[f64; L]; 2]; R],
 }
 
-/// The Riccati recursion of several noises side by side: covariance of (previous sample noise, short, slow) before a window.
-struct Riccati<'a, const L: usize> {
+/// The Riccati recursion of several noises side by side: covariance of (previous sample noise, short, slow) before a window, then of
+/// those with the two states of each resonance, and of these among themselves.
+struct Riccati<'a, const L: usize, const R: usize> {
     variance: [[f64; L]; 3],
     tau_s: [[f64; L]; 2],
+    resonance: [[Resonance; L]; R],
     schedule: &'a Schedule,
     p: [[f64; L]; 6],
+    with_resonance: [[[[f64; L]; 2]; 3]; R],
+    of_resonance: [[[f64; L]; 3]; R],
     decay: [[f64; L]; 2],
+    turn: [[[f64; L]; 2]; R],
     step_before: f64,
 }
 
-impl<'a, const L: usize> Riccati<'a, L> {
+impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
     fn new(noise: &[AxisNoise; L], schedule: &'a Schedule) -> Self {
         let of = |f: fn(&AxisNoise) -> f64| std::array::from_fn(|l| f(&noise[l]));
         let variance = [of(|n| n.white_ng.powi(2)), of(|n| n.short_ng.powi(2)), of(|n| n.slow_ng.powi(2))];
         let none = [0.0; L];
+        let resonance = [noise.map(|n| n.resonance.unwrap_or(Resonance::NONE)); R];
         Self {
             variance,
             tau_s: [of(|n| n.short_tau_s), of(|n| n.slow_tau_s)],
+            resonance,
             schedule,
             p: [variance[0], none, none, variance[1], none, variance[2]],
+            with_resonance: [[[none; 2]; 3]; R],
+            of_resonance: resonance.map(|of| [of.map(|r| r.rms_ng.powi(2)), none, of.map(|r| r.rms_ng.powi(2))]),
             decay: [none; 2],
+            turn: [[none; 2]; R],
             step_before: f64::NAN,
         }
     }
 
     /// The row of window `i` at activities `s` and bursts, and the variances of its innovations; windows in order.
     #[inline(always)]
-    fn row(&mut self, i: usize, s: [f64; L], burst: [f64; L]) -> (Row<L>, [f64; L]) {
+    fn row(&mut self, i: usize, s: [f64; L], burst: [f64; L]) -> (Row<L, R>, [f64; L]) {
         let [own, previous] = self.schedule.overlap[i];
         let step = self.schedule.step_s[i];
         if step != self.step_before {
             self.decay = self.tau_s.map(|tau| tau.map(|tau| (-step / tau).exp()));
+            self.turn = self.resonance.map(|of| {
+                let turns = of.map(|r| r.turn(step));
+                [turns.map(|[cos, _]| cos), turns.map(|[_, sin]| sin)]
+            });
             self.step_before = step;
         }
-        let mut row = Row { h: [[0.0; L]; 2], per_sd: [0.0; L], gain: [[0.0; L]; 3], decay: self.decay };
+        let mut row = Row {
+            h: [[0.0; L]; 2],
+            per_sd: [0.0; L],
+            gain: [[0.0; L]; 3],
+            decay: self.decay,
+            resonance_gain: [[[0.0; L]; 2]; R],
+            turn: self.turn,
+        };
         let mut variance = [0.0; L];
         for l in 0..L {
             let [vw, v1, v2] = [self.variance[0][l] * burst[l], self.variance[1][l], self.variance[2][l]];
@@ -60,9 +84,20 @@ impl<'a, const L: usize> Riccati<'a, L> {
             let p12 = self.p[4][l] * f1 * f2;
             let p22 = f2 * f2 * (self.p[5][l] - v2) + v2;
             let (h0, h1) = (s[l] * previous, s[l]);
-            let [c0, c1, c2] = [h0 * p00 + h1 * p01 + p02, h0 * p01 + h1 * p11 + p12, h0 * p02 + h1 * p12 + p22];
+            let [mut c0, mut c1, mut c2] =
+                [h0 * p00 + h1 * p01 + p02, h0 * p01 + h1 * p11 + p12, h0 * p02 + h1 * p12 + p22];
             let ce = s[l] * own * vw;
-            variance[l] = h0 * c0 + h1 * c1 + c2 + s[l] * own * ce;
+            // Covariances of what is seen with each resonance.
+            let mut cr = [[0.0; 2]; R];
+            for r in 0..R {
+                self.turned(r, l);
+                let (with, of) = (&self.with_resonance[r], &self.of_resonance[r]);
+                cr[r] = std::array::from_fn(|j| h0 * with[0][j][l] + h1 * (with[1][j][l] + of[j][l]) + with[2][j][l]);
+                c0 += h1 * with[0][0][l];
+                c1 += h1 * with[1][0][l];
+                c2 += h1 * with[2][0][l];
+            }
+            variance[l] = h0 * c0 + h1 * (c1 + cr.iter().map(|c| c[0]).sum::<f64>()) + c2 + s[l] * own * ce;
             let inverse = 1.0 / variance[l];
             let gain = [ce * inverse, c1 * inverse, c2 * inverse];
             self.p[0][l] = vw - ce * gain[0];
@@ -71,10 +106,42 @@ impl<'a, const L: usize> Riccati<'a, L> {
             self.p[3][l] = p11 - c1 * gain[1];
             self.p[4][l] = p12 - c1 * gain[2];
             self.p[5][l] = p22 - c2 * gain[2];
+            for r in 0..R {
+                let [a, b] = cr[r].map(|c| c * inverse);
+                let (with, of) = (&mut self.with_resonance[r], &mut self.of_resonance[r]);
+                for (j, gain) in [a, b].into_iter().enumerate() {
+                    with[0][j][l] = -ce * gain;
+                    with[1][j][l] -= c1 * gain;
+                    with[2][j][l] -= c2 * gain;
+                    row.resonance_gain[r][j][l] = gain;
+                }
+                of[0][l] -= cr[r][0] * a;
+                of[1][l] -= cr[r][0] * b;
+                of[2][l] -= cr[r][1] * b;
+            }
             (row.h[0][l], row.h[1][l], row.per_sd[l]) = (h0, h1, inverse.sqrt());
             (row.gain[0][l], row.gain[1][l], row.gain[2][l]) = (gain[0], gain[1], gain[2]);
         }
         (row, variance)
+    }
+
+    /// Takes the covariances of a resonance from the window before to this one: its two states turn into each other and decay.
+    #[inline(always)]
+    fn turned(&mut self, r: usize, l: usize) {
+        let [cos, sin] = [self.turn[r][0][l], self.turn[r][1][l]];
+        let turned = |[a, b]: [f64; 2]| [cos * a - sin * b, sin * a + cos * b];
+        for (with, decay) in self.with_resonance[r].iter_mut().zip([1.0, self.decay[0][l], self.decay[1][l]]) {
+            let [a, b] = turned([with[0][l], with[1][l]]);
+            (with[0][l], with[1][l]) = (decay * a, decay * b);
+        }
+        let v = self.resonance[r][l].rms_ng.powi(2);
+        let of = &mut self.of_resonance[r];
+        let (aa, ab, bb) = (of[0][l] - v, of[1][l], of[2][l] - v);
+        let [first, second] = [turned([aa, ab]), turned([ab, bb])];
+        let [aa, ab] = turned([first[0], second[0]]);
+        of[0][l] = aa + v;
+        of[1][l] = ab;
+        of[2][l] = turned([first[1], second[1]])[1] + v;
     }
 }
 
@@ -106,41 +173,48 @@ impl<const L: usize> LogSum<L> {
 
 /// What filters remember of their series.
 #[derive(Clone, Copy)]
-struct Memory<const L: usize>([[f64; L]; 3]);
+struct Memory<const L: usize, const R: usize>([[f64; L]; 3], [[[f64; L]; 2]; R]);
 
-impl<const L: usize> Memory<L> {
+impl<const L: usize, const R: usize> Memory<L, R> {
     fn new() -> Self {
-        Self([[0.0; L]; 3])
+        Self([[0.0; L]; 3], [[[0.0; L]; 2]; R])
     }
 
     /// The whitened innovations of the next values, each filter with the row of its own.
     #[inline(always)]
-    fn whiten(&mut self, row: &Row<L>, x: [f64; L]) -> [f64; L] {
-        let [z0, z1, z2] = &mut self.0;
-        let mut out = [0.0; L];
-        for l in 0..L {
-            let (one, two) = (z1[l] * row.decay[0][l], z2[l] * row.decay[1][l]);
-            let innovation = x[l] - row.h[0][l] * z0[l] - row.h[1][l] * one - two;
-            z0[l] = row.gain[0][l] * innovation;
-            z1[l] = one + row.gain[1][l] * innovation;
-            z2[l] = two + row.gain[2][l] * innovation;
-            out[l] = innovation * row.per_sd[l];
-        }
-        out
+    fn whiten(&mut self, row: &Row<L, R>, x: [f64; L]) -> [f64; L] {
+        self.whiten_by(row, x, |l| l)
     }
 
     /// The same with one filter for all of them.
     #[inline(always)]
-    fn whiten_alike(&mut self, row: &Row<1>, x: [f64; L]) -> [f64; L] {
-        let [z0, z1, z2] = &mut self.0;
+    fn whiten_alike(&mut self, row: &Row<1, R>, x: [f64; L]) -> [f64; L] {
+        self.whiten_by(row, x, |_| 0)
+    }
+
+    /// The same, each with the filter at a place of the row.
+    #[inline(always)]
+    fn whiten_by<const F: usize>(&mut self, row: &Row<F, R>, x: [f64; L], of: impl Fn(usize) -> usize) -> [f64; L] {
+        let Self([z0, z1, z2], resonances) = self;
         let mut out = [0.0; L];
         for l in 0..L {
-            let (one, two) = (z1[l] * row.decay[0][0], z2[l] * row.decay[1][0]);
-            let innovation = x[l] - row.h[0][0] * z0[l] - row.h[1][0] * one - two;
-            z0[l] = row.gain[0][0] * innovation;
-            z1[l] = one + row.gain[1][0] * innovation;
-            z2[l] = two + row.gain[2][0] * innovation;
-            out[l] = innovation * row.per_sd[0];
+            let f = of(l);
+            let (one, two) = (z1[l] * row.decay[0][f], z2[l] * row.decay[1][f]);
+            let mut innovation = x[l] - row.h[0][f] * z0[l] - row.h[1][f] * one - two;
+            for (states, [cos, sin]) in resonances.iter_mut().zip(&row.turn) {
+                let [a, b] = [states[0][l], states[1][l]];
+                states[0][l] = cos[f] * a - sin[f] * b;
+                states[1][l] = sin[f] * a + cos[f] * b;
+                innovation -= row.h[1][f] * states[0][l];
+            }
+            z0[l] = row.gain[0][f] * innovation;
+            z1[l] = one + row.gain[1][f] * innovation;
+            z2[l] = two + row.gain[2][f] * innovation;
+            for (states, gain) in resonances.iter_mut().zip(&row.resonance_gain) {
+                states[0][l] += gain[0][f] * innovation;
+                states[1][l] += gain[1][f] * innovation;
+            }
+            out[l] = innovation * row.per_sd[f];
         }
         out
     }
@@ -151,7 +225,11 @@ const CHUNK: usize = 64;
 
 /// Values become their whitened innovations, all by one filter.
 #[multiversion(targets("x86_64+avx+avx2"))]
-fn whiten_chunk<const L: usize>(memory: &mut Memory<L>, rows: &[Row<1>], values: &mut [[f64; L]]) {
+fn whiten_chunk<const L: usize, const R: usize>(
+    memory: &mut Memory<L, R>,
+    rows: &[Row<1, R>],
+    values: &mut [[f64; L]],
+) {
     for (value, row) in values.iter_mut().zip(rows) {
         *value = memory.whiten_alike(row, *value);
     }
@@ -191,24 +269,41 @@ impl Tail {
 /// The whitening filter of one axis: linear, the same for data and for every regressor.
 #[derive(Debug, Clone)]
 pub struct Whitener {
-    rows: Vec<Row<1>>,
+    rows: Rows,
     log_det: f64,
+}
+
+/// Rows of a filter without a resonance, and with one.
+#[derive(Debug, Clone)]
+enum Rows {
+    Plain(Vec<Row<1, 0>>),
+    Resonant(Vec<Row<1, 1>>),
+}
+
+/// Rows of a filter, and the log determinant of the covariance.
+fn rows<const R: usize>(noise: &AxisNoise, schedule: &Schedule, loudness: &Loudness) -> (Vec<Row<1, R>>, f64) {
+    let mut riccati = Riccati::new(&[*noise], schedule);
+    let mut log_det = LogSum::new();
+    let rows = (0..schedule.len())
+        .map(|i| {
+            let (row, variance) = riccati.row(i, [loudness.activity[i]], [loudness.burst[i]]);
+            log_det.add(variance);
+            row
+        })
+        .collect();
+    let [log_det] = log_det.total();
+    (rows, log_det)
 }
 
 impl Whitener {
     /// From the noise, the windows and how loud each is.
     pub fn new(noise: &AxisNoise, schedule: &Schedule, loudness: &Loudness) -> Self {
-        let mut riccati = Riccati::new(&[*noise], schedule);
-        let mut log_det = LogSum::new();
-        let rows = (0..schedule.len())
-            .map(|i| {
-                let (row, variance) = riccati.row(i, [loudness.activity[i]], [loudness.burst[i]]);
-                log_det.add(variance);
-                row
-            })
-            .collect();
-        let [log_det] = log_det.total();
-        Self { rows, log_det }
+        if noise.resonance.is_none() {
+            let (rows, log_det) = rows(noise, schedule, loudness);
+            return Self { rows: Rows::Plain(rows), log_det };
+        }
+        let (rows, log_det) = rows(noise, schedule, loudness);
+        Self { rows: Rows::Resonant(rows), log_det }
     }
 
     /// Log determinant of the covariance.
@@ -218,71 +313,95 @@ impl Whitener {
 
     /// Share of the variance of the innovation of window `i` that its new samples have as long as they are ordinary.
     pub fn new_share(&self, i: usize, noise: &AxisNoise, schedule: &Schedule, loudness: &Loudness) -> f64 {
-        (loudness.activity[i] * schedule.overlap[i][0] * noise.white_ng * self.rows[i].per_sd[0]).powi(2)
+        let [per_sd] = match &self.rows {
+            Rows::Plain(rows) => rows[i].per_sd,
+            Rows::Resonant(rows) => rows[i].per_sd,
+        };
+        (loudness.activity[i] * schedule.overlap[i][0] * noise.white_ng * per_sd).powi(2)
     }
 
     /// Whitened innovations of a series at the windows.
     pub fn whiten(&self, series: &[f64]) -> Vec<f64> {
-        let mut memory = Memory::new();
-        self.rows.iter().zip(series).flat_map(|(row, x)| memory.whiten(row, [*x])).collect()
+        match &self.rows {
+            Rows::Plain(rows) => whiten(rows, series),
+            Rows::Resonant(rows) => whiten(rows, series),
+        }
     }
 
     /// Whitened innovations of several series, in single precision. Each answer starts at the first window of its stretch and ends
-    /// where what the filter remembers is negligible (1e-5 of its largest value).
-    ///
-    /// Side by side, because one after the other waits for itself: every step of a filter needs the one before.
+    /// where what the filter remembers of it is negligible; outside it, it is zero. Side by side they take little longer than one
+    /// for itself: every step of a filter needs the one before.
     pub fn whiten_stretches<const L: usize>(&self, series: [Stretch; L]) -> [Vec<f32>; L] {
-        let n = self.rows.len();
-        debug_assert!(series.iter().all(|s| s.end() <= n), "a value for no more than every window");
-        let begin = series.iter().map(|s| s.first).min().unwrap_or(0).min(n);
-        let rest = series.iter().map(Stretch::end).max().unwrap_or(n);
-        let mut memory = Memory::new();
-        let mut out: [Vec<f32>; L] = std::array::from_fn(|_| Vec::with_capacity(n - begin));
-        let mut tails = series.map(Tail::new);
-        for chunk in (begin..n).step_by(CHUNK) {
-            let end = (chunk + CHUNK).min(n);
-            let mut values = [[0.0; L]; CHUNK];
-            for (l, series) in series.iter().enumerate() {
-                let (from, to) = (series.first.max(chunk), series.end().min(end));
-                if from < to {
-                    let inside = &series.values[from - series.first..to - series.first];
-                    values[from - chunk..].iter_mut().zip(inside).for_each(|(value, x)| value[l] = *x);
-                }
-            }
-            whiten_chunk(&mut memory, &self.rows[chunk..end], &mut values);
-            for (l, out) in out.iter_mut().enumerate() {
-                out.extend(values[..end - chunk].iter().map(|value| value[l] as f32));
-            }
-            for (tail, out) in tails.iter_mut().zip(&out).filter(|(tail, _)| tail.last < n) {
-                tail.follow(&out[chunk - begin..], chunk);
-            }
-            if end > rest && tails.iter().all(|tail| tail.end.is_some()) {
-                break;
-            }
+        match &self.rows {
+            Rows::Plain(rows) => whiten_stretches(rows, series),
+            Rows::Resonant(rows) => whiten_stretches(rows, series),
         }
-        for (l, out) in out.iter_mut().enumerate() {
-            out.truncate(tails[l].end.unwrap_or(n).max(begin) - begin);
-            out.drain(..(series[l].first.min(n) - begin).min(out.len()));
-            out.shrink_to_fit();
-        }
-        out
     }
 
-    /// Three whole series, each with a filter of its own, in one pass; in single precision.
+    /// Three whole series, each with a filter of its own, in one pass where they are alike; in single precision.
     pub fn whiten_three(filters: &[Whitener; 3], series: [&[f64]; 3]) -> [Vec<f32>; 3] {
-        let n = filters[0].rows.len();
-        let rows = [&filters[0].rows[..n], &filters[1].rows[..n], &filters[2].rows[..n]];
-        let series = series.map(|s| &s[..n]);
-        let mut memory = [Memory::new(); 3];
-        let mut out: [Vec<f32>; 3] = std::array::from_fn(|_| Vec::with_capacity(n));
-        for i in 0..n {
-            for k in 0..3 {
-                let [w] = memory[k].whiten(&rows[k][i], [series[k][i]]);
-                out[k].push(w as f32);
+        if let [Rows::Plain(x), Rows::Plain(y), Rows::Plain(z)] = filters.each_ref().map(|filter| &filter.rows) {
+            return whiten_three([x, y, z], series);
+        }
+        std::array::from_fn(|k| filters[k].whiten(series[k]).into_iter().map(|w| w as f32).collect())
+    }
+}
+
+fn whiten<const R: usize>(rows: &[Row<1, R>], series: &[f64]) -> Vec<f64> {
+    let mut memory = Memory::new();
+    rows.iter().zip(series).flat_map(|(row, x)| memory.whiten(row, [*x])).collect()
+}
+
+fn whiten_stretches<const L: usize, const R: usize>(rows: &[Row<1, R>], series: [Stretch; L]) -> [Vec<f32>; L] {
+    let n = rows.len();
+    debug_assert!(series.iter().all(|s| s.end() <= n), "a value for no more than every window");
+    let begin = series.iter().map(|s| s.first).min().unwrap_or(0).min(n);
+    let rest = series.iter().map(Stretch::end).max().unwrap_or(n);
+    let mut memory = Memory::new();
+    let mut out: [Vec<f32>; L] = std::array::from_fn(|_| Vec::with_capacity(n - begin));
+    let mut tails = series.map(Tail::new);
+    for chunk in (begin..n).step_by(CHUNK) {
+        let end = (chunk + CHUNK).min(n);
+        let mut values = [[0.0; L]; CHUNK];
+        for (l, series) in series.iter().enumerate() {
+            let (from, to) = (series.first.max(chunk), series.end().min(end));
+            if from < to {
+                let inside = &series.values[from - series.first..to - series.first];
+                values[from - chunk..].iter_mut().zip(inside).for_each(|(value, x)| value[l] = *x);
             }
         }
-        out
+        whiten_chunk(&mut memory, &rows[chunk..end], &mut values);
+        for (l, out) in out.iter_mut().enumerate() {
+            out.extend(values[..end - chunk].iter().map(|value| value[l] as f32));
+        }
+        for (tail, out) in tails.iter_mut().zip(&out).filter(|(tail, _)| tail.last < n) {
+            tail.follow(&out[chunk - begin..], chunk);
+        }
+        if end > rest && tails.iter().all(|tail| tail.end.is_some()) {
+            break;
+        }
     }
+    for (l, out) in out.iter_mut().enumerate() {
+        out.truncate(tails[l].end.unwrap_or(n).max(begin) - begin);
+        out.drain(..(series[l].first.min(n) - begin).min(out.len()));
+        out.shrink_to_fit();
+    }
+    out
+}
+
+fn whiten_three(rows: [&Vec<Row<1, 0>>; 3], series: [&[f64]; 3]) -> [Vec<f32>; 3] {
+    let n = rows[0].len();
+    let rows = rows.map(|rows| &rows[..n]);
+    let series = series.map(|s| &s[..n]);
+    let mut memory = [Memory::new(); 3];
+    let mut out: [Vec<f32>; 3] = std::array::from_fn(|_| Vec::with_capacity(n));
+    for i in 0..n {
+        for k in 0..3 {
+            let [w] = memory[k].whiten(&rows[k][i], [series[k][i]]);
+            out[k].push(w as f32);
+        }
+    }
+    out
 }
 
 /// A series with what is nuisance in it: a constant, and errors that all windows share.
@@ -341,8 +460,22 @@ impl Products {
 }
 
 /// Products of several series in one pass, each with noise and loudness of its own.
-#[multiversion(targets("x86_64+avx+avx2"))]
 pub(super) fn products<const L: usize>(
+    noise: &[AxisNoise; L],
+    schedule: &Schedule,
+    loudness: [&Loudness; L],
+    series: [Series; L],
+) -> [Products; L] {
+    if noise.iter().all(|n| n.resonance.is_none()) {
+        products_with::<L, 0>(noise, schedule, loudness, series)
+    } else {
+        products_with::<L, 1>(noise, schedule, loudness, series)
+    }
+}
+
+/// The same with so many resonances.
+#[multiversion(targets("x86_64+avx+avx2"))]
+fn products_with<const L: usize, const R: usize>(
     noise: &[AxisNoise; L],
     schedule: &Schedule,
     loudness: [&Loudness; L],
@@ -356,11 +489,11 @@ pub(super) fn products<const L: usize>(
     let nothing = vec![0.0; if errors > 0 { n } else { 0 }];
     let shared: Vec<[&[f64]; L]> =
         (0..errors).map(|j| series.map(|s| s.shared.get(j).map_or(&nothing[..], |e| &e[..n]))).collect();
-    let mut riccati = Riccati::new(noise, schedule);
+    let mut riccati = Riccati::<L, R>::new(noise, schedule);
     let mut log_det = LogSum::new();
-    let mut memory = [Memory::new(); 2];
+    let mut memory = [Memory::<L, R>::new(); 2];
     let mut sums = [[0.0; L]; 3];
-    let mut of_errors = vec![(Memory::new(), [0.0; L]); errors];
+    let mut of_errors = vec![(Memory::<L, R>::new(), [0.0; L]); errors];
     // Of every error with the series, with the constant, and with the errors up to itself.
     let mut error_sums = vec![[0.0; L]; errors * (errors + 5) / 2];
     for i in 0..n {
@@ -410,8 +543,14 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 
-    const NOISE: AxisNoise =
-        AxisNoise { white_ng: 100.0, short_ng: 30.0, short_tau_s: 120.0, slow_ng: 25.0, slow_tau_s: 3600.0 };
+    const NOISE: AxisNoise = AxisNoise {
+        white_ng: 100.0,
+        short_ng: 30.0,
+        short_tau_s: 120.0,
+        slow_ng: 25.0,
+        slow_tau_s: 3600.0,
+        resonance: None,
+    };
 
     fn record(seed: u64) -> (Schedule, Loudness, Vec<f64>) {
         let clock: Vec<f64> = (0..2000).filter(|i| i % 190 > 3).map(|i| 25.0 * f64::from(i)).collect();
@@ -486,5 +625,49 @@ mod tests {
         let best = found.likeliest_scale2();
         let at = |x: f64| found.log_likelihood(best * x);
         assert!(at(1.0) > at(1.3) && at(1.0) > at(0.7), "{} {} {}", at(0.7), at(1.0), at(1.3));
+    }
+
+    /// Every part written out as a covariance, a resonance as a damped cosine: likelihood, whitening, and three filters side by side.
+    #[test]
+    fn the_filter_is_that_of_the_covariance_with_a_resonance_and_without() {
+        let resonance = Resonance { rms_ng: 40.0, period_s: 330.0, tau_s: 410.0 };
+        let clock: Vec<f64> = (0..60).filter(|i| i % 17 > 2).map(|i| 25.0 * f64::from(i)).collect();
+        let schedule = Schedule::new(&clock);
+        let n = clock.len();
+        let loudness = Loudness::even((0..n).map(|i| 0.6 + 0.01 * i as f64).collect());
+        let data: Vec<f64> = (0..n).map(|i| 100.0 * (i as f64 * 1.3).sin() + 3.0 * i as f64).collect();
+        let noises = [NOISE, AxisNoise { resonance: Some(resonance), ..NOISE }];
+        let whiteners = noises.map(|noise| Whitener::new(&noise, &schedule, &loudness));
+        let series = [Series { data: &data, shared: &[] }; 2];
+        let found = products(&noises, &schedule, [&loudness; 2], series);
+        for ((noise, whitener), found) in noises.iter().zip(&whiteners).zip(&found) {
+            let covariance = DMatrix::from_fn(n, n, |i, j| {
+                let apart = (clock[i] - clock[j]).abs();
+                let white = NOISE.white_ng.powi(2) * (1.0 - apart / 50.0).max(0.0);
+                let short = NOISE.short_ng.powi(2) * (-apart / NOISE.short_tau_s).exp();
+                let slow = NOISE.slow_ng.powi(2) * (-apart / NOISE.slow_tau_s).exp();
+                let oscillating = noise.resonance.map_or(0.0, |r| {
+                    r.rms_ng.powi(2) * (-apart / r.tau_s).exp() * (std::f64::consts::TAU * apart / r.period_s).cos()
+                });
+                loudness.activity[i] * loudness.activity[j] * (white + short + oscillating) + slow
+            });
+            let inverse = covariance.clone().try_inverse().unwrap();
+            let (one, d) = (DVector::from_element(n, 1.0), DVector::from_column_slice(&data));
+            let (cc, dc, dd) = (one.dot(&(&inverse * &one)), one.dot(&(&inverse * &d)), d.dot(&(&inverse * &d)));
+            let log_det = covariance.cholesky().unwrap().l().diagonal().map(f64::ln).sum() * 2.0;
+            assert!((whitener.log_det() - log_det).abs() < 1e-8, "{} {log_det}", whitener.log_det());
+            let direct = -0.5 * (log_det + dd - dc * dc / cc + cc.ln());
+            assert!((found.log_likelihood(1.0) - direct).abs() < 1e-8, "{} {direct}", found.log_likelihood(1.0));
+            let energy: f64 = whitener.whiten(&data).iter().map(|w| w * w).sum();
+            assert!((energy / dd - 1.0).abs() < 1e-10, "{energy} {dd}");
+        }
+        let [plain, resonant] = whiteners;
+        let together = Whitener::whiten_three(&[plain.clone(), resonant.clone(), plain.clone()], [&data; 3]);
+        for (whitened, whitener) in together.iter().zip([&plain, &resonant, &plain]) {
+            let alone: Vec<f32> = whitener.whiten(&data).into_iter().map(|w| w as f32).collect();
+            assert_eq!(*whitened, alone);
+            let [stretch] = whitener.whiten_stretches([Stretch::of(&data[..])]);
+            assert_eq!(stretch[..], alone[alone.len() - stretch.len()..]);
+        }
     }
 }

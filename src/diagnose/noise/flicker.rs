@@ -156,8 +156,14 @@ mod tests {
         Schedule::new(&clock)
     }
 
-    const QUICK: AxisNoise =
-        AxisNoise { white_ng: 80.0, short_ng: 15.0, short_tau_s: 100.0, slow_ng: 0.01, slow_tau_s: 3000.0 };
+    const QUICK: AxisNoise = AxisNoise {
+        white_ng: 80.0,
+        short_ng: 15.0,
+        short_tau_s: 100.0,
+        slow_ng: 0.01,
+        slow_tau_s: 3000.0,
+        resonance: None,
+    };
 
     /// Records of quick noise beside autoregressions of these times and of equal power, `slow_ng` together.
     fn records(seed: u64, times_s: &[f64], slow_ng: f64) -> (Schedule, [Loudness; 3], [Vec<f64>; 3]) {

@@ -191,8 +191,14 @@ mod tests {
         settled([&dev_ng; 3], &sleeps, residual.each_ref().map(|x| &x[..]), &schedule)
     }
 
-    const WHITE: AxisNoise =
-        AxisNoise { white_ng: 60.0, short_ng: 10.0, short_tau_s: 100.0, slow_ng: 2.0, slow_tau_s: 3000.0 };
+    const WHITE: AxisNoise = AxisNoise {
+        white_ng: 60.0,
+        short_ng: 10.0,
+        short_tau_s: 100.0,
+        slow_ng: 2.0,
+        slow_tau_s: 3000.0,
+        resonance: None,
+    };
 
     #[test]
     fn deviations_that_say_what_the_windows_show_are_believed() {
@@ -211,7 +217,14 @@ mod tests {
 
     #[test]
     fn deviations_that_the_windows_contradict_are_not() {
-        let red = AxisNoise { white_ng: 5.0, short_ng: 80.0, short_tau_s: 110.0, slow_ng: 1.0, slow_tau_s: 3000.0 };
+        let red = AxisNoise {
+            white_ng: 5.0,
+            short_ng: 80.0,
+            short_tau_s: 110.0,
+            slow_ng: 1.0,
+            slow_tau_s: 3000.0,
+            resonance: None,
+        };
         for (seed, noise) in [(1, WHITE), (2, red), (3, red)] {
             for ratio in [1.0, 3.0] {
                 for contradicted in record(seed, &noise, ratio).1 {

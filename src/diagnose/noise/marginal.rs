@@ -137,8 +137,14 @@ mod tests {
     fn slow_noise_that_is_needed_costs_more_than_slow_noise_that_is_not() {
         let schedule = Schedule::new(&(0..3000).map(|i| 25.0 * f64::from(i)).collect::<Vec<f64>>());
         let loudness = std::array::from_fn(|_| Loudness::even(vec![1.0; schedule.len()]));
-        let noise =
-            |slow_ng| AxisNoise { white_ng: 60.0, short_ng: 10.0, short_tau_s: 100.0, slow_ng, slow_tau_s: 3000.0 };
+        let noise = |slow_ng| AxisNoise {
+            white_ng: 60.0,
+            short_ng: 10.0,
+            short_tau_s: 100.0,
+            slow_ng,
+            slow_tau_s: 3000.0,
+            resonance: None,
+        };
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let mut marginal = |made: f64, fitted: f64| {
             let residual = std::array::from_fn(|_| {
@@ -164,6 +170,7 @@ mod tests {
                 short_tau_s: 100.0,
                 slow_ng: 30.0 * scale,
                 slow_tau_s: 3000.0,
+                resonance: None,
             };
             let residual =
                 std::array::from_fn(|_| simulate(&noise, &schedule, &loudness[0], || StandardNormal.sample(&mut rng)));

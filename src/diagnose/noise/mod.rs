@@ -2,9 +2,9 @@
 //!
 //! Per axis three parts: white noise of the samples, seen through windows that overlap by half (a moving average, exactly
 //! as the stride has it), a short autoregression (tens of seconds to minutes), both following the crew's activity, and
-//! a slow autoregression (minutes to hours) that does not. The order was chosen so: one autoregression alone either
-//! misses the slow part or takes the overlap for it. State space, so that gaps are simply longer steps. Samples out of the ordinary
-//! have a variance of their own (see [`Loudness`]).
+//! a slow autoregression (minutes to hours) that does not. One autoregression alone either misses the slow part or takes the overlap
+//! for it; one of the second order, a resonance, is beside them where an information criterion asks for it (see `order`). State space,
+//! so that gaps are simply longer steps. Samples out of the ordinary have a variance of their own (see [`Loudness`]).
 //!
 //! The amplitude of the slow part is estimated on a logarithmic scale with a prior: it never reaches zero, and a
 //! record too short to exclude slow noise is treated as having some. That is what keeps false leaks away. A hypothesis is weighed
@@ -16,6 +16,7 @@ mod flicker;
 mod levels;
 mod loudness;
 mod marginal;
+mod order;
 
 pub use binned::{BIN_S, Binned};
 pub use filter::Whitener;
@@ -24,6 +25,7 @@ pub use flicker::where_it_may_be_flicker;
 pub use levels::{Contradicted, settled};
 pub use loudness::Loudness;
 pub use marginal::{SlowPart, slow_part_marginalised};
+pub use order::{PERIODS_S, with_resonances};
 
 use multiversion::multiversion;
 
@@ -42,12 +44,41 @@ pub struct AxisNoise {
     pub slow_ng: f64,
     /// Its correlation time.
     pub slow_tau_s: f64,
+    /// A resonance beside them, where there is one.
+    pub resonance: Option<Resonance>,
+}
+
+/// Noise that oscillates about a period and forgets its phase: an autoregression of the second order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resonance {
+    /// RMS, ng, at activity 1.
+    pub rms_ng: f64,
+    /// Period, s.
+    pub period_s: f64,
+    /// Time in which its phase is forgotten, s.
+    pub tau_s: f64,
+}
+
+impl Resonance {
+    /// One of no size.
+    const NONE: Self = Self { rms_ng: 0.0, period_s: 600.0, tau_s: 600.0 };
+
+    /// Cosine and sine of the angle by which its two states turn in a step, both decayed.
+    fn turn(&self, step_s: f64) -> [f64; 2] {
+        let keep = (-step_s / self.tau_s).exp();
+        if keep == 0.0 {
+            return [0.0; 2];
+        }
+        let (sin, cos) = (std::f64::consts::TAU * step_s / self.period_s).sin_cos();
+        [keep * cos, keep * sin]
+    }
 }
 
 impl AxisNoise {
     /// RMS of a window at activity 1.
     pub fn rms_ng(&self) -> f64 {
-        (self.white_ng.powi(2) + self.short_ng.powi(2) + self.slow_ng.powi(2)).sqrt()
+        let resonance_ng = self.resonance.map_or(0.0, |r| r.rms_ng);
+        (self.white_ng.powi(2) + self.short_ng.powi(2) + self.slow_ng.powi(2) + resonance_ng.powi(2)).sqrt()
     }
 }
 
@@ -180,22 +211,21 @@ fn fit_and_likelihoods(
         let mean = residual.iter().sum::<f64>() / n;
         (residual.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt().max(1e-6)
     });
-    let noise_of = |p: &[f64], scale_ng: f64| AxisNoise {
-        white_ng: scale_ng,
-        short_ng: scale_ng * p[0].exp(),
-        short_tau_s: p[1].exp(),
-        slow_ng: scale_ng * p[2].exp(),
-        slow_tau_s: p[3].exp(),
+    // A resonance stays as it began, beside the white noise.
+    let beside = |k: usize| start.and_then(|start| Some((start[k].resonance?, start[k].white_ng)));
+    let noise_of = |k: usize, p: &[f64], scale_ng: f64| AxisNoise {
+        resonance: beside(k).map(|(r, white_ng)| Resonance { rms_ng: r.rms_ng * scale_ng / white_ng, ..r }),
+        ..from_logarithms(p, scale_ng)
     };
     let series = AXIS_OF_LANE.map(|k| Series { data: residual_ng[k], shared: shared_ng[k] });
     let loudness = AXIS_OF_LANE.map(|k| loudness[k]);
     // The overall scale is profiled: one rescaling step is exact up to the prior of the slow amplitude.
     let evaluate = |points: [&[f64]; 3]| {
-        let unit = AXIS_OF_LANE.map(|k| noise_of(points[k], rms_ng[k]));
+        let unit = AXIS_OF_LANE.map(|k| noise_of(k, points[k], rms_ng[k]));
         let found = products(&unit, schedule, loudness, series);
         std::array::from_fn::<(AxisNoise, f64), 3, _>(|k| {
             let scale2 = found[k].likeliest_scale2();
-            let noise = noise_of(points[k], rms_ng[k] * (0.5 * scale2.ln()).exp());
+            let noise = noise_of(k, points[k], rms_ng[k] * (0.5 * scale2.ln()).exp());
             (noise, found[k].log_likelihood(scale2) + log_prior(&noise))
         })
     };
@@ -211,15 +241,9 @@ fn fit_and_likelihoods(
         }
     };
     let mut simplexes = std::array::from_fn::<Simplex, 3, _>(|k| {
-        let begin = match start.map(|start| start[k]) {
-            Some(s) => {
-                [(s.short_ng / s.white_ng).ln(), s.short_tau_s.ln(), (s.slow_ng / s.white_ng).ln(), s.slow_tau_s.ln()]
-            }
-            None => usual[k],
-        };
+        let begin = start.map_or(usual[k], |start| logarithms(start[k]));
         Simplex::new(&begin, &width, evaluations)
     });
-    let is_outside = |p: &[f64]| p.iter().zip(BOUNDS).any(|(x, [low, high])| *x < low || *x > high);
     loop {
         for simplex in &mut simplexes {
             while simplex.asks().is_some_and(is_outside) {
@@ -239,6 +263,34 @@ fn fit_and_likelihoods(
     }
     let best = simplexes.map(Simplex::best);
     evaluate(best.each_ref().map(|p| &p[..]))
+}
+
+/// The numbers of a noise that are fitted: logarithms of the short part's share of the white noise and of its time, s, and of the slow
+/// part's.
+fn logarithms(noise: &AxisNoise) -> [f64; 4] {
+    [
+        (noise.short_ng / noise.white_ng).ln(),
+        noise.short_tau_s.ln(),
+        (noise.slow_ng / noise.white_ng).ln(),
+        noise.slow_tau_s.ln(),
+    ]
+}
+
+/// The noise of such numbers and of so much white noise.
+fn from_logarithms(p: &[f64], white_ng: f64) -> AxisNoise {
+    AxisNoise {
+        white_ng,
+        short_ng: white_ng * p[0].exp(),
+        short_tau_s: p[1].exp(),
+        slow_ng: white_ng * p[2].exp(),
+        slow_tau_s: p[3].exp(),
+        resonance: None,
+    }
+}
+
+/// Whether such numbers are beyond their bounds.
+fn is_outside(p: &[f64]) -> bool {
+    p.iter().zip(BOUNDS).any(|(x, [low, high])| *x < low || *x > high)
 }
 
 /// Where a fit begins: the logarithms of 0.2, 100 s, 0.1 and 3000 s; and, where the noise is one with a memory and hardly white at
@@ -263,7 +315,7 @@ const BEGINS: [[f64; 4]; 13] = [
 /// Log likelihood by which another beginning must be better than the usual one.
 const FAR_BETTER: f64 = 20.0;
 
-/// Bounds of a fit: logarithms of the short part's share and time, s, and of the slow part's.
+/// Bounds of a fit.
 const BOUNDS: [[f64; 2]; 4] = [[-6.0, 3.0], [2.0, 7.0], [-9.0, 4.0], [5.0, 10.5]];
 const MIDDLE: [f64; 4] = [-2.0, 4.5, -2.5, 7.5];
 
@@ -291,15 +343,22 @@ pub fn simulate(
     let mut previous = noise.white_ng * normal();
     let mut short = noise.short_ng * normal();
     let mut slow = noise.slow_ng * normal();
+    let mut resonance = noise.resonance.map(|r| (r, [r.rms_ng * normal(), r.rms_ng * normal()]));
     (0..schedule.len())
         .map(|i| {
             let step = schedule.step_s[i];
             let [f1, f2] = [(-step / noise.short_tau_s).exp(), (-step / noise.slow_tau_s).exp()];
             short = f1 * short + (1.0 - f1 * f1).sqrt() * noise.short_ng * normal();
             slow = f2 * slow + (1.0 - f2 * f2).sqrt() * noise.slow_ng * normal();
+            let oscillating = resonance.as_mut().map_or(0.0, |(r, [x, y])| {
+                let [cos, sin] = r.turn(step);
+                let new_ng = r.rms_ng * (1.0 - cos * cos - sin * sin).sqrt();
+                (*x, *y) = (cos * *x - sin * *y + new_ng * normal(), sin * *x + cos * *y + new_ng * normal());
+                *x
+            });
             let own = noise.white_ng * loudness.burst[i].sqrt() * normal();
             let [a, b] = schedule.overlap[i];
-            let value = loudness.activity[i] * (a * own + b * previous + short) + slow;
+            let value = loudness.activity[i] * (a * own + b * previous + short + oscillating) + slow;
             previous = own;
             value
         })
@@ -327,8 +386,14 @@ mod tests {
 
     #[test]
     fn what_the_filter_leaves_of_its_own_noise_is_white_and_of_unit_size_across_gaps_levels_and_bursts() {
-        let noise =
-            AxisNoise { white_ng: 100.0, short_ng: 30.0, short_tau_s: 120.0, slow_ng: 25.0, slow_tau_s: 3600.0 };
+        let noise = AxisNoise {
+            white_ng: 100.0,
+            short_ng: 30.0,
+            short_tau_s: 120.0,
+            slow_ng: 25.0,
+            slow_tau_s: 3600.0,
+            resonance: None,
+        };
         let schedule = gappy();
         let mut loudness = Loudness::even((0..schedule.len()).map(|i| if i > 1500 { 0.6 } else { 1.2 }).collect());
         loudness.burst.iter_mut().step_by(40).for_each(|burst| *burst = 30.0);
@@ -354,7 +419,14 @@ mod tests {
         let x: Vec<f64> =
             centres.iter().map(|c| samples[c - 125..c + 125].iter().sum::<f64>() / 250.0_f64.sqrt()).collect();
         let schedule = Schedule::new(&centres.iter().map(|c| *c as f64 / 5.0).collect::<Vec<f64>>());
-        let noise = AxisNoise { white_ng: 1.0, short_ng: 1e-3, short_tau_s: 100.0, slow_ng: 1e-6, slow_tau_s: 3000.0 };
+        let noise = AxisNoise {
+            white_ng: 1.0,
+            short_ng: 1e-3,
+            short_tau_s: 100.0,
+            slow_ng: 1e-6,
+            slow_tau_s: 3000.0,
+            resonance: None,
+        };
         let loudness = Loudness::even(vec![1.0; schedule.len()]);
         let w = Whitener::new(&noise, &schedule, &loudness).whiten(&x);
         let n = w.len() as f64;
@@ -368,8 +440,14 @@ mod tests {
 
     #[test]
     fn the_fit_recovers_white_and_slow_noise() {
-        let noise =
-            AxisNoise { white_ng: 100.0, short_ng: 25.0, short_tau_s: 110.0, slow_ng: 30.0, slow_tau_s: 3000.0 };
+        let noise = AxisNoise {
+            white_ng: 100.0,
+            short_ng: 25.0,
+            short_tau_s: 110.0,
+            slow_ng: 30.0,
+            slow_tau_s: 3000.0,
+            resonance: None,
+        };
         let schedule = gappy();
         let loudness = Loudness::even(vec![1.0; schedule.len()]);
         let x = simulate(&noise, &schedule, &loudness, normals(11));
@@ -386,7 +464,14 @@ mod tests {
         let schedule = gappy();
         let loudness = Loudness::even(vec![1.0; schedule.len()]);
         for short_tau_s in [70.0, 110.0] {
-            let noise = AxisNoise { white_ng: 5.0, short_ng: 100.0, short_tau_s, slow_ng: 0.01, slow_tau_s: 3000.0 };
+            let noise = AxisNoise {
+                white_ng: 5.0,
+                short_ng: 100.0,
+                short_tau_s,
+                slow_ng: 0.01,
+                slow_tau_s: 3000.0,
+                resonance: None,
+            };
             let x = simulate(&noise, &schedule, &loudness, normals(5));
             let [found, ..] = fit([&x, &x, &x], [&[]; 3], &schedule, [&loudness; 3], None, 110);
             assert!((found.short_ng / 100.0 - 1.0).abs() < 0.1, "{found:?}");

@@ -4,6 +4,7 @@ use super::grid::Grid;
 use super::{Remains, sharing};
 use crate::diagnose::case::WINDOW_STRIDE_S;
 use crate::math::shared_work;
+use rustfft::num_complex::Complex64;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Shortest period of a line that is looked for, s, and the fewest cycles in the record.
@@ -21,8 +22,18 @@ fn tail(degrees: f64, x: f64) -> f64 {
 /// Power, place in the spectrum, drift in cycles, power per axis.
 type Line = (f64, usize, f64, [f64; 3]);
 
-/// Is there a line?
+/// Is there a line? What is left that is not white is noise to it.
 pub(super) fn line(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
+    loudest(grid, scale_ng, |spectrum, m| grid.loudness(spectrum, m))
+}
+
+/// The same where nothing but a line is allowed to be louder than white.
+pub(super) fn line_beside_white(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
+    loudest(grid, scale_ng, |_, _| 1.0)
+}
+
+/// The loudest line beside noise so many times as loud as white, at least 1, in a spectrum about a line of it.
+fn loudest(grid: &Grid, scale_ng: [f64; 3], loudness: impl Fn(&[Complex64], usize) -> f64 + Sync) -> Option<Remains> {
     let n = grid.length();
     let last = ((grid.span_s() / LINE_S) as usize).min(n / 2 - 1);
     let steps = (DRIFT_CYCLES / DRIFT_STEP) as i32;
@@ -39,7 +50,7 @@ pub(super) fn line(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
                 continue;
             }
             // Beside what is left that is not white, a line is as much fainter.
-            let sum = (0..3).map(|k| power[k] / grid.loudness(&spectra[k], m)).sum();
+            let sum = (0..3).map(|k| power[k] / loudness(&spectra[k], m)).sum();
             if beats(sum) {
                 best = Some((sum, m, cycles, power));
             }

@@ -8,12 +8,14 @@
 //! Slow noise that is no autoregression is not white behind the filter of one: what is left is louder in some band than the noise
 //! fitted. Lines, and findings, are measured by how loud it is where they are.
 
+mod band;
 mod chain;
 mod grid;
 mod line;
 mod switching;
 mod together;
 
+pub use self::band::loud_about_s;
 use self::grid::Grid;
 use super::noise::{AxisNoise, Binned, Loudness, Schedule};
 use super::scene::Axes;
@@ -64,6 +66,13 @@ pub fn strongest(
         .map(|r| Remains { probability: (questions * r.probability).min(1.0), ..r })
 }
 
+/// Probability of the loudest line in what a hypothesis leaves, if that is white but for the line: how well a line would explain it.
+pub fn probability_of_a_line(left: &Left, noise: &[AxisNoise; 3], schedule: &Schedule) -> f64 {
+    let found = Grid::new(&schedule.clock_s, &left.whitened)
+        .and_then(|grid| line::line_beside_white(&grid, noise.map(|n| n.rms_ng())));
+    found.map_or(1.0, |line| line.probability)
+}
+
 /// How loud what a hypothesis leaves is, beside the noise fitted to it, at the periods at which a whitened signal lives.
 pub fn loudness_under(left: &Left, schedule: &Schedule, signal: &Axes) -> f64 {
     Grid::new(&schedule.clock_s, &left.whitened).map_or(1.0, |grid| grid.loudness_under(&schedule.clock_s, signal))
@@ -85,7 +94,14 @@ mod tests {
 
     #[test]
     fn noise_alone_leaves_nothing() {
-        let noise = AxisNoise { white_ng: 80.0, short_ng: 15.0, short_tau_s: 100.0, slow_ng: 12.0, slow_tau_s: 4000.0 };
+        let noise = AxisNoise {
+            white_ng: 80.0,
+            short_ng: 15.0,
+            short_tau_s: 100.0,
+            slow_ng: 12.0,
+            slow_tau_s: 4000.0,
+            resonance: None,
+        };
         let clock_s: Vec<f64> = (0..5000).filter(|i| i % 170 > 4).map(|i| 25.0 * f64::from(i)).collect();
         let schedule = Schedule::new(&clock_s);
         let loudness: [Loudness; 3] = std::array::from_fn(|_| Loudness::even(vec![1.0; clock_s.len()]));

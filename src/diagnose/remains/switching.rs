@@ -94,8 +94,14 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_distr::{Distribution, StandardNormal};
 
-    const NOISE: AxisNoise =
-        AxisNoise { white_ng: 60.0, short_ng: 10.0, short_tau_s: 100.0, slow_ng: 0.0, slow_tau_s: 3000.0 };
+    const NOISE: AxisNoise = AxisNoise {
+        white_ng: 60.0,
+        short_ng: 10.0,
+        short_tau_s: 100.0,
+        slow_ng: 0.0,
+        slow_tau_s: 3000.0,
+        resonance: None,
+    };
 
     /// A record of 36 h, with slow noise or a push along y that switches.
     fn record(seed: u64, slow_ng: f64, push_ng: f64) -> [Binned; 3] {

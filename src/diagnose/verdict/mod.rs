@@ -31,7 +31,7 @@ use super::catalogue::Effect;
 use super::design::Frame;
 use super::locate;
 use super::model::{self, MemberFit};
-use super::noise::Contradicted;
+use super::noise::{AxisNoise, Contradicted, Resonance};
 use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{Entry, Family, Member, Set, Weighed};
@@ -118,6 +118,7 @@ fn of_the_mismatch(
 ) -> (Diagnosis, Axes, Vec<(String, f64)>) {
     let mut notes = of_windows(scene);
     notes.extend(of_proportion(scene));
+    notes.extend(of_resonances(&solution.null));
     notes.extend(of_colour(solution.statistic() - proof.statistic));
     let listed = credible(scene, library, &solution.listed, &mut notes);
     let judged = judge(scene, library, solution, &listed, proof);
@@ -248,6 +249,18 @@ fn of_windows(scene: &Scene) -> Vec<String> {
         ));
     }
     notes
+}
+
+/// Says which axes are taken to have noise of the second order.
+fn of_resonances(null: &Weighed) -> Vec<String> {
+    let told = |(axis, noise): (&str, &AxisNoise)| {
+        let Resonance { rms_ng, period_s, tau_s } = noise.resonance?;
+        Some(format!(
+            "the noise of axis {axis} is taken to resonate, {rms_ng:.0} ng about a period of {period_s:.0} s, its phase forgotten in \
+             {tau_s:.0} s: the windows make that likelier than a line or none, at the price of its three numbers"
+        ))
+    };
+    ["x", "y", "z"].into_iter().zip(&null.noise).filter_map(told).collect()
 }
 
 /// Says by how much evidence was lessened, where that may matter.
