@@ -81,15 +81,19 @@ pub(super) fn means(series: &[f64], schedule: &Schedule, loudness: &Loudness) ->
 /// Variance of the sum of some windows, in order.
 fn variance_of_sum(windows: &[usize], noise: &AxisNoise, schedule: &Schedule, activity: &[f64]) -> f64 {
     let [white, short] = [noise.white_ng.powi(2), noise.short_ng.powi(2)];
-    let oscillating = |apart_s: f64| noise.resonance.map_or(0.0, |r| r.rms_ng.powi(2) * r.turn(apart_s)[0]);
+    let oscillating = |i: usize, j: usize, apart_s: f64| {
+        noise.resonance.map_or(0.0, |r| {
+            r.rms_ng.powi(2) * r.transition(apart_s)[0][0] * r.loudness(activity[i]) * r.loudness(activity[j])
+        })
+    };
     let mut sum = 0.0;
     for (a, i) in windows.iter().enumerate() {
-        sum += activity[*i].powi(2) * (white + short + oscillating(0.0));
+        sum += activity[*i].powi(2) * (white + short) + oscillating(*i, *i, 0.0);
         for j in &windows[a + 1..] {
             let apart = schedule.clock_s[*j] - schedule.clock_s[*i];
             let shared = if *j == i + 1 { schedule.overlap[*j][1] * schedule.overlap[*i][0] * white } else { 0.0 };
             let short = short * (-apart / noise.short_tau_s).exp();
-            sum += 2.0 * activity[*i] * activity[*j] * (shared + short + oscillating(apart));
+            sum += 2.0 * (activity[*i] * activity[*j] * (shared + short) + oscillating(*i, *j, apart));
         }
     }
     sum

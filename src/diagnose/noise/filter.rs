@@ -16,7 +16,8 @@ struct Row<const L: usize, const R: usize> {
     gain: [[f64; L]; 3],
     decay: [[f64; L]; 2],
     resonance_gain: [[[f64; L]; 2]; R],
-    turn: [[[f64; L]; 2]; R],
+    resonance_h: [[f64; L]; R],
+    transition: [[[[f64; L]; 2]; 2]; R],
 }
 
 /// The Riccati recursion of several noises side by side: covariance of (previous sample noise, short, slow) before a window, then of
@@ -30,7 +31,7 @@ struct Riccati<'a, const L: usize, const R: usize> {
     with_resonance: [[[[f64; L]; 2]; 3]; R],
     of_resonance: [[[f64; L]; 3]; R],
     decay: [[f64; L]; 2],
-    turn: [[[f64; L]; 2]; R],
+    transition: [[[[f64; L]; 2]; 2]; R],
     step_before: f64,
 }
 
@@ -49,7 +50,7 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
             with_resonance: [[[none; 2]; 3]; R],
             of_resonance: resonance.map(|of| [of.map(|r| r.rms_ng.powi(2)), none, of.map(|r| r.rms_ng.powi(2))]),
             decay: [none; 2],
-            turn: [[none; 2]; R],
+            transition: [[[none; 2]; 2]; R],
             step_before: f64::NAN,
         }
     }
@@ -61,9 +62,9 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
         let step = self.schedule.step_s[i];
         if step != self.step_before {
             self.decay = self.tau_s.map(|tau| tau.map(|tau| (-step / tau).exp()));
-            self.turn = self.resonance.map(|of| {
-                let turns = of.map(|r| r.turn(step));
-                [turns.map(|[cos, _]| cos), turns.map(|[_, sin]| sin)]
+            self.transition = self.resonance.map(|of| {
+                let all = of.map(|r| r.transition(step));
+                std::array::from_fn(|i| std::array::from_fn(|j| all.map(|transition| transition[i][j])))
             });
             self.step_before = step;
         }
@@ -73,7 +74,8 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
             gain: [[0.0; L]; 3],
             decay: self.decay,
             resonance_gain: [[[0.0; L]; 2]; R],
-            turn: self.turn,
+            resonance_h: [[0.0; L]; R],
+            transition: self.transition,
         };
         let mut variance = [0.0; L];
         for l in 0..L {
@@ -89,15 +91,20 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
             let ce = s[l] * own * vw;
             // Covariances of what is seen with each resonance.
             let mut cr = [[0.0; 2]; R];
+            let mut seen = 0.0;
             for r in 0..R {
-                self.turned(r, l);
+                self.step_resonance(r, l);
                 let (with, of) = (&self.with_resonance[r], &self.of_resonance[r]);
-                cr[r] = std::array::from_fn(|j| h0 * with[0][j][l] + h1 * (with[1][j][l] + of[j][l]) + with[2][j][l]);
-                c0 += h1 * with[0][0][l];
-                c1 += h1 * with[1][0][l];
-                c2 += h1 * with[2][0][l];
+                let hr = self.resonance[r][l].loudness(s[l]);
+                cr[r] =
+                    std::array::from_fn(|j| h0 * with[0][j][l] + h1 * with[1][j][l] + with[2][j][l] + hr * of[j][l]);
+                c0 += hr * with[0][0][l];
+                c1 += hr * with[1][0][l];
+                c2 += hr * with[2][0][l];
+                seen += hr * cr[r][0];
+                row.resonance_h[r][l] = hr;
             }
-            variance[l] = h0 * c0 + h1 * (c1 + cr.iter().map(|c| c[0]).sum::<f64>()) + c2 + s[l] * own * ce;
+            variance[l] = h0 * c0 + h1 * c1 + c2 + seen + s[l] * own * ce;
             let inverse = 1.0 / variance[l];
             let gain = [ce * inverse, c1 * inverse, c2 * inverse];
             self.p[0][l] = vw - ce * gain[0];
@@ -125,23 +132,21 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
         (row, variance)
     }
 
-    /// Takes the covariances of a resonance from the window before to this one: its two states turn into each other and decay.
+    /// Takes the covariances of a resonance from the window before to this one.
     #[inline(always)]
-    fn turned(&mut self, r: usize, l: usize) {
-        let [cos, sin] = [self.turn[r][0][l], self.turn[r][1][l]];
-        let turned = |[a, b]: [f64; 2]| [cos * a - sin * b, sin * a + cos * b];
+    fn step_resonance(&mut self, r: usize, l: usize) {
+        let [a, b] = self.transition[r].map(|row| [row[0][l], row[1][l]]);
+        let step = |[x, v]: [f64; 2]| [a[0] * x + a[1] * v, b[0] * x + b[1] * v];
         for (with, decay) in self.with_resonance[r].iter_mut().zip([1.0, self.decay[0][l], self.decay[1][l]]) {
-            let [a, b] = turned([with[0][l], with[1][l]]);
-            (with[0][l], with[1][l]) = (decay * a, decay * b);
+            let [x, v] = step([with[0][l], with[1][l]]);
+            (with[0][l], with[1][l]) = (decay * x, decay * v);
         }
-        let v = self.resonance[r][l].rms_ng.powi(2);
+        // Displacement and velocity are independent and as large in the long run: they go back to that.
+        let variance = self.resonance[r][l].rms_ng.powi(2);
         let of = &mut self.of_resonance[r];
-        let (aa, ab, bb) = (of[0][l] - v, of[1][l], of[2][l] - v);
-        let [first, second] = [turned([aa, ab]), turned([ab, bb])];
-        let [aa, ab] = turned([first[0], second[0]]);
-        of[0][l] = aa + v;
-        of[1][l] = ab;
-        of[2][l] = turned([first[1], second[1]])[1] + v;
+        let columns = [step([of[0][l] - variance, of[1][l]]), step([of[1][l], of[2][l] - variance])];
+        let [first, second] = [0, 1].map(|row| step([columns[0][row], columns[1][row]]));
+        (of[0][l], of[1][l], of[2][l]) = (first[0] + variance, first[1], second[1] + variance);
     }
 }
 
@@ -201,11 +206,11 @@ impl<const L: usize, const R: usize> Memory<L, R> {
             let f = of(l);
             let (one, two) = (z1[l] * row.decay[0][f], z2[l] * row.decay[1][f]);
             let mut innovation = x[l] - row.h[0][f] * z0[l] - row.h[1][f] * one - two;
-            for (states, [cos, sin]) in resonances.iter_mut().zip(&row.turn) {
-                let [a, b] = [states[0][l], states[1][l]];
-                states[0][l] = cos[f] * a - sin[f] * b;
-                states[1][l] = sin[f] * a + cos[f] * b;
-                innovation -= row.h[1][f] * states[0][l];
+            for ((states, [a, b]), h) in resonances.iter_mut().zip(&row.transition).zip(&row.resonance_h) {
+                let [x, v] = [states[0][l], states[1][l]];
+                states[0][l] = a[0][f] * x + a[1][f] * v;
+                states[1][l] = b[0][f] * x + b[1][f] * v;
+                innovation -= h[f] * states[0][l];
             }
             z0[l] = row.gain[0][f] * innovation;
             z1[l] = one + row.gain[1][f] * innovation;
@@ -627,19 +632,20 @@ mod tests {
         assert!(at(1.0) > at(1.3) && at(1.0) > at(0.7), "{} {} {}", at(0.7), at(1.0), at(1.3));
     }
 
-    /// Every part written out as a covariance, a resonance as a damped cosine: likelihood, whitening, and three filters side by side.
+    /// Every part written out as a covariance, a resonance as that of a driven damped oscillator: likelihood, whitening, and three filters side by side.
     #[test]
     fn the_filter_is_that_of_the_covariance_with_a_resonance_and_without() {
-        let resonance = Resonance { rms_ng: 40.0, period_s: 330.0, tau_s: 410.0 };
+        let resonance = Resonance { rms_ng: 40.0, period_s: 330.0, tau_s: 410.0, follows_crew: false };
         let clock: Vec<f64> = (0..60).filter(|i| i % 17 > 2).map(|i| 25.0 * f64::from(i)).collect();
         let schedule = Schedule::new(&clock);
         let n = clock.len();
         let loudness = Loudness::even((0..n).map(|i| 0.6 + 0.01 * i as f64).collect());
         let data: Vec<f64> = (0..n).map(|i| 100.0 * (i as f64 * 1.3).sin() + 3.0 * i as f64).collect();
-        let noises = [NOISE, AxisNoise { resonance: Some(resonance), ..NOISE }];
+        let loud_awake = Resonance { follows_crew: true, ..resonance };
+        let noises = [None, Some(resonance), Some(loud_awake)].map(|resonance| AxisNoise { resonance, ..NOISE });
         let whiteners = noises.map(|noise| Whitener::new(&noise, &schedule, &loudness));
-        let series = [Series { data: &data, shared: &[] }; 2];
-        let found = products(&noises, &schedule, [&loudness; 2], series);
+        let series = [Series { data: &data, shared: &[] }; 3];
+        let found = products(&noises, &schedule, [&loudness; 3], series);
         for ((noise, whitener), found) in noises.iter().zip(&whiteners).zip(&found) {
             let covariance = DMatrix::from_fn(n, n, |i, j| {
                 let apart = (clock[i] - clock[j]).abs();
@@ -647,9 +653,13 @@ mod tests {
                 let short = NOISE.short_ng.powi(2) * (-apart / NOISE.short_tau_s).exp();
                 let slow = NOISE.slow_ng.powi(2) * (-apart / NOISE.slow_tau_s).exp();
                 let oscillating = noise.resonance.map_or(0.0, |r| {
-                    r.rms_ng.powi(2) * (-apart / r.tau_s).exp() * (std::f64::consts::TAU * apart / r.period_s).cos()
+                    let damped = std::f64::consts::TAU / r.period_s;
+                    let oscillation = (damped * apart).cos() + (damped * apart).sin() / (damped * r.tau_s);
+                    r.rms_ng.powi(2) * (-apart / r.tau_s).exp() * oscillation
                 });
-                loudness.activity[i] * loudness.activity[j] * (white + short + oscillating) + slow
+                let activities = loudness.activity[i] * loudness.activity[j];
+                let follows = noise.resonance.is_some_and(|r| r.follows_crew);
+                activities * (white + short) + if follows { activities } else { 1.0 } * oscillating + slow
             });
             let inverse = covariance.clone().try_inverse().unwrap();
             let (one, d) = (DVector::from_element(n, 1.0), DVector::from_column_slice(&data));
@@ -661,9 +671,8 @@ mod tests {
             let energy: f64 = whitener.whiten(&data).iter().map(|w| w * w).sum();
             assert!((energy / dd - 1.0).abs() < 1e-10, "{energy} {dd}");
         }
-        let [plain, resonant] = whiteners;
-        let together = Whitener::whiten_three(&[plain.clone(), resonant.clone(), plain.clone()], [&data; 3]);
-        for (whitened, whitener) in together.iter().zip([&plain, &resonant, &plain]) {
+        let together = Whitener::whiten_three(&whiteners, [&data; 3]);
+        for (whitened, whitener) in together.iter().zip(&whiteners) {
             let alone: Vec<f32> = whitener.whiten(&data).into_iter().map(|w| w as f32).collect();
             assert_eq!(*whitened, alone);
             let [stretch] = whitener.whiten_stretches([Stretch::of(&data[..])]);

@@ -66,22 +66,27 @@ impl Axis<'_> {
 
     /// The likeliest noise with a resonance about a period, and the log likelihood gained.
     fn with_resonance(&self, noise: &AxisNoise, about_s: f64) -> (AxisNoise, f64) {
-        let of = |p: &[f64]| {
+        let of = |p: &[f64], follows_crew: bool| {
             let plain = from_logarithms(p, noise.white_ng);
             let [rms_ng, period_s] = [plain.white_ng * p[4].exp(), p[5].exp()];
-            let resonance = Resonance { rms_ng, period_s, tau_s: period_s * p[6].exp() };
+            let resonance = Resonance { rms_ng, period_s, tau_s: period_s * p[6].exp(), follows_crew };
             AxisNoise { resonance: Some(resonance), ..plain }
         };
         let inside = |x: f64, [low, high]: [f64; 2]| (low..=high).contains(&x.exp());
-        let value = |p: &[f64]| {
+        let value = |p: &[f64], follows_crew: bool| {
             let allowed = !is_outside(&p[..4]) && p[4] < 3.0 && inside(p[5], PERIODS_S) && inside(p[6], FORGOTTEN);
-            if allowed { -self.scaled(&of(p)).1 } else { f64::INFINITY }
+            if allowed { -self.scaled(&of(p, follows_crew)).1 } else { f64::INFINITY }
         };
         let [a, b, c, d] = logarithms(noise);
         let begins = BEGINS.map(|periods| [a, b, c, d, SHARE.ln(), about_s.ln(), f64::ln(periods)]);
-        let begin = begins.iter().min_by(|p, q| value(&p[..]).total_cmp(&value(&q[..]))).unwrap_or(&begins[0]);
-        let best = nelder_mead(begin, &[0.3, 0.3, 0.4, 0.4, 0.5, 0.15, 0.4], EVALUATIONS, value);
-        let (resonant, likelihood) = self.scaled(&of(&best));
+        let likeliest = |follows_crew: bool| {
+            let value = |p: &[f64]| value(p, follows_crew);
+            let begin = begins.iter().min_by(|p, q| value(&p[..]).total_cmp(&value(&q[..]))).unwrap_or(&begins[0]);
+            let best = nelder_mead(begin, &[0.3, 0.3, 0.4, 0.4, 0.5, 0.15, 0.4], EVALUATIONS, value);
+            self.scaled(&of(&best, follows_crew))
+        };
+        let [follows, steady] = [true, false].map(likeliest);
+        let (resonant, likelihood) = if steady.1 > follows.1 { steady } else { follows };
         (resonant, likelihood - self.scaled(noise).1)
     }
 }
@@ -102,11 +107,13 @@ mod tests {
         resonance: None,
     };
 
-    /// A day and a half of noise on three axes, and what it is found to be when asked about a period.
+    /// A day and a half of noise on three axes with a quiet night, and what it is found to be when asked about a period.
     fn found(seed: u64, noise: &AxisNoise, about_s: f64) -> Option<([AxisNoise; 3], f64)> {
         let clock: Vec<f64> = (0..5200).filter(|i| i % 170 > 4).map(|i| 25.0 * f64::from(i)).collect();
         let schedule = Schedule::new(&clock);
-        let loudness = std::array::from_fn(|_| Loudness::even(vec![1.0; clock.len()]));
+        let loudness = std::array::from_fn(|_| {
+            Loudness::even((0..clock.len()).map(|i| if (1500..3000).contains(&i) { 0.6 } else { 1.0 }).collect())
+        });
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         let residual: [Vec<f64>; 3] =
             std::array::from_fn(|k| simulate(noise, &schedule, &loudness[k], || StandardNormal.sample(&mut rng)));
@@ -115,16 +122,19 @@ mod tests {
 
     #[test]
     fn a_resonance_is_found_as_it_is_and_nowhere_else() {
-        for (seed, period_s, tau_s) in [(1, 300.0, 500.0), (2, 900.0, 900.0), (3, 1700.0, 4000.0)] {
-            let resonance = Some(Resonance { rms_ng: 35.0, period_s, tau_s });
+        for (seed, period_s, tau_s, follows_crew) in
+            [(1, 300.0, 500.0, true), (2, 900.0, 900.0, false), (3, 1700.0, 4000.0, false), (4, 600.0, 900.0, true)]
+        {
+            let resonance = Some(Resonance { rms_ng: 35.0, period_s, tau_s, follows_crew });
             let (noise, price) = found(seed, &AxisNoise { resonance, ..PLAIN }, 0.85 * period_s).unwrap();
             assert!((price - 3.0 * 1.5 * 5045f64.ln()).abs() < 0.1, "{price}");
             for noise in noise {
                 let r = noise.resonance.unwrap();
-                // The spectrum is some 40 to 150 times as wide as its lines: a few hundredths of the period, a tenth and a half of the others.
+                // It is some tens to hundreds of times as wide as a line of the spectrum: bounds of three standard errors and more.
                 assert!((r.period_s / period_s).ln().abs() < 0.1, "{period_s}: {r:?}");
                 assert!((r.tau_s / tau_s).ln().abs() < 0.7, "{tau_s}: {r:?}");
                 assert!((r.rms_ng / 35.0).ln().abs() < 0.3, "{r:?}");
+                assert_eq!(r.follows_crew, follows_crew, "{r:?}");
                 assert!((noise.white_ng / PLAIN.white_ng).ln().abs() < 0.1, "{noise:?}");
             }
             assert_eq!(found(seed, &PLAIN, period_s), None, "{period_s}");

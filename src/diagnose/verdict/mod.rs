@@ -254,10 +254,11 @@ fn of_windows(scene: &Scene) -> Vec<String> {
 /// Says which axes are taken to have noise of the second order.
 fn of_resonances(null: &Weighed) -> Vec<String> {
     let told = |(axis, noise): (&str, &AxisNoise)| {
-        let Resonance { rms_ng, period_s, tau_s } = noise.resonance?;
+        let Resonance { rms_ng, period_s, tau_s, follows_crew } = noise.resonance?;
+        let when = if follows_crew { "louder when the crew is awake" } else { "whatever the crew does" };
         Some(format!(
             "the noise of axis {axis} is taken to resonate, {rms_ng:.0} ng about a period of {period_s:.0} s, its phase forgotten in \
-             {tau_s:.0} s: the windows make that likelier than a line or none, at the price of its three numbers"
+             {tau_s:.0} s, {when}: the windows make that likelier than a line or none, at the price of its three numbers"
         ))
     };
     ["x", "y", "z"].into_iter().zip(&null.noise).filter_map(told).collect()
