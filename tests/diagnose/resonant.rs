@@ -26,7 +26,7 @@ fn noise_that_resonates_is_no_finding_and_is_told() {
     assert!(told >= SEEDS.len(), "{told}");
 }
 
-/// An oscillation that keeps its phase is a finding, a fifth of the noise as it is; so it stays when the noise resonates elsewhere.
+/// An oscillation that keeps its phase is a finding, a tenth of the noise as it is; so it stays when the noise resonates elsewhere.
 #[test]
 fn an_oscillation_that_keeps_its_phase_is_no_noise() {
     for (seed, wander) in [(1, Wander::Autoregression), (2, Wander::Resonant)] {

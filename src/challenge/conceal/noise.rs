@@ -31,7 +31,8 @@ pub struct Noise {
     pub bursts: bool,
 }
 
-/// Largest deviation of slow noise, ng, as the acceptance has it: twice that of noise that shares it among octaves, or is quick beside it.
+/// Largest deviation of slow noise, ng, as the acceptance has it. Noise that shares it among octaves, and noise that resonates, which is
+/// quicker, have twice as much.
 const SLOW_NG: f64 = 30.0;
 
 /// Share of half windows that are bursts, and how much louder they are.
@@ -340,7 +341,7 @@ mod tests {
             let series = noise.slow_series(&mut rng, 0, 200_000);
             let n = series.len() as f64;
             let variance = series.iter().map(|x| x * x).sum::<f64>() / n;
-            // Seven hundred times the longest memory: within a tenth by three standard errors.
+            // Eight hundred times the longest memory: within a tenth by three standard errors.
             assert!((variance / 400.0 - 1.0).abs() < 0.1, "{seed}: {variance}");
             let crossings = series.windows(2).filter(|w| w[0] * w[1] < 0.0).count() as f64;
             periods_s.push(2.0 * n * WINDOW_STRIDE_S / crossings);

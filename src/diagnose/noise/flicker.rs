@@ -8,7 +8,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::binned::{BIN_S, Binned, means};
-use super::filter::Products;
+use super::likelihood::Products;
 use super::marginal::{amplitudes_ng, times_s, widths};
 use super::{AxisNoise, Loudness, Schedule};
 use crate::math::shared_work;

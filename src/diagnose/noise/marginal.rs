@@ -2,7 +2,7 @@
 
 use std::iter::successors;
 
-use super::filter::{Products, Series, products};
+use super::likelihood::{Products, Series, products};
 use super::{AxisNoise, Loudness, Schedule};
 use crate::math::shared_work;
 

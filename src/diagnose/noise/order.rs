@@ -1,8 +1,8 @@
 //! The order of the quick noise: one autoregression of the first order beside the white samples, or one of the second, a resonance,
 //! beside both, where a criterion asks for it.
 
-use super::filter::{Series, products};
-use super::{AxisNoise, Loudness, Resonance, Schedule, from_logarithms, is_outside, log_prior, logarithms};
+use super::likelihood::{Series, products};
+use super::{AxisNoise, BOUNDS, Loudness, Resonance, Schedule, from_logarithms, is_outside, log_prior, logarithms};
 use crate::diagnose::optimise::nelder_mead;
 use crate::math::shared_work;
 
@@ -74,7 +74,8 @@ impl Axis<'_> {
         };
         let inside = |x: f64, [low, high]: [f64; 2]| (low..=high).contains(&x.exp());
         let value = |p: &[f64], follows_crew: bool| {
-            let allowed = !is_outside(&p[..4]) && p[4] < 3.0 && inside(p[5], PERIODS_S) && inside(p[6], FORGOTTEN);
+            let allowed =
+                !is_outside(&p[..4]) && p[4] <= BOUNDS[0][1] && inside(p[5], PERIODS_S) && inside(p[6], FORGOTTEN);
             if allowed { -self.scaled(&of(p, follows_crew)).1 } else { f64::INFINITY }
         };
         let [a, b, c, d] = logarithms(noise);
