@@ -3,7 +3,6 @@
 //!
 //! Sixty cases cannot prove 99 %, and they can show that it is not so: a rate is refuted when a program that just reaches its aim would
 //! do as badly by chance less than once in [`CHANCE`].
-#![cfg(feature = "slow")]
 
 use indicatif::ProgressBar;
 use oare_ground::challenge::conceal::{self, Kind, Manner};
@@ -35,6 +34,7 @@ fn aim(text: &str) -> (f64, bool) {
 /// The table of nulls beside the bootstrap it stands for: on records with nothing missing, the whole search run again on noise drawn
 /// from the fitted one must reach the statistic of a tabulated probability about as often as the table says.
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn the_table_of_nulls_agrees_with_the_bootstrap() {
     const REPLICATES: usize = 30;
     let replicates: Vec<[f64; 3]> = [Kind::Clean, Kind::Slow, Kind::Clean, Kind::Slow]
@@ -99,6 +99,7 @@ fn refuted(cases: usize, manner: Manner) -> Vec<String> {
 }
 
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn sixty_concealed_cases_refute_no_aim() {
     let refuted = refuted(60, Manner::default());
     assert!(refuted.is_empty(), "refuted:\n{}", refuted.join("\n"));
@@ -106,6 +107,7 @@ fn sixty_concealed_cases_refute_no_aim() {
 
 /// The same of recordings that are dumps, each from an instrument of its own that calibrates itself.
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn forty_concealed_dumps_refute_no_aim() {
     let refuted = refuted(40, Manner { dump: true, ..Manner::default() });
     assert!(refuted.is_empty(), "refuted:\n{}", refuted.join("\n"));

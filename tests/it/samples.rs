@@ -116,8 +116,8 @@ fn thirty_orders_of_arrival_give_the_same_bytes() {
     compare_orders(24);
 }
 
-#[cfg(feature = "slow")]
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn all_720_orders_of_arrival_give_the_same_bytes() {
     compare_orders(1);
 }

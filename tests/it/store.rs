@@ -277,8 +277,8 @@ async fn a_killed_service_has_everything_it_counted() {
     kill_and_restart(&dumps, 4, 0.6, 7).await;
 }
 
-#[cfg(feature = "slow")]
 #[tokio::test(flavor = "multi_thread")]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 async fn fifty_kills_in_a_mission_lose_nothing() {
     use oare_ground::simulate::recorder::{RecorderConfig, frames, playbacks};
     use oare_ground::simulate::{Mission, MissionConfig};

@@ -64,11 +64,11 @@ fn the_full_model_lacks_nothing() {
 }
 
 /// All 32 satellites.
-#[cfg(feature = "slow")]
 mod all {
     use super::*;
 
     #[test]
+    #[cfg_attr(not(feature = "slow"), ignore = "slow")]
     fn the_published_ladder_is_climbed_and_one_satellite_stays_unexplained() {
         let Some(answer) = diagnose("gps-orbits-2010", &[]) else { return };
         assert_eq!((answer.verdict, ids(&answer)), (Verdict::Explained, RADIATION.to_vec()));
@@ -83,6 +83,7 @@ mod all {
     }
 
     #[test]
+    #[cfg_attr(not(feature = "slow"), ignore = "slow")]
     fn the_first_day_predicts_the_second() {
         let Some(answer) = diagnose("gps-orbits-2010", &["recording.fit_hours=24"]) else { return };
         let predicted: Vec<f64> = answer.steps.iter().filter_map(|s| s.predicted_rms).collect();
@@ -91,6 +92,7 @@ mod all {
     }
 
     #[test]
+    #[cfg_attr(not(feature = "slow"), ignore = "slow")]
     fn degrees_and_the_sun_are_missed_when_they_are_left_out() {
         for (left, id) in
             [(["gravity:3", "sun", "moon"].as_slice(), "gravity_degree"), (&["gravity:8", "moon"], "third_body_sun")]

@@ -37,6 +37,7 @@ fn sentences(found: &[Anomaly]) -> Vec<String> {
 }
 
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn clean_days_have_no_false_anomaly() {
     let days = seeds(200, 20);
     let false_ones: Vec<(u64, Vec<String>)> = (5000..5000 + days)
@@ -177,6 +178,7 @@ fn share_found(kind: AnomalyKind) -> f64 {
 /// One kind may miss a day: within a day, the first measurement of a mission is told from the steep start of the law by the others'
 /// scatter only.
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn planted_faults_are_found_and_rightly_named() {
     use AnomalyKind::*;
     let kinds = [

@@ -1,5 +1,5 @@
 //! Calibration against the truth: the sample dumps, and one simulated day. The pooled missions are in `coverage`, `anomalies` and
-//! `settling`: `cargo test --release --features slow --test sim -- --nocapture` flies a part of them, `OARE_SEEDS=all` before it the
+//! `settling`: `cargo test --features slow --test sim -- --nocapture` flies a part of them, `OARE_SEEDS=all` before it the
 //! whole, `OARE_SEEDS=20` that many seeds.
 
 use std::collections::BTreeMap;

@@ -120,11 +120,13 @@ fn hold(tallies: &[Tally]) {
 }
 
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn three_days_pooled_over_seeds() {
     hold(&pooled("3 days", 1000, seeds(50, 10), |seed| MissionConfig::sts65(seed, 72.0)));
 }
 
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn three_days_of_other_instruments_pooled_over_seeds() {
     hold(&pooled("3 days, every instrument another", 3000, seeds(50, 10), |seed| {
         let mut config = MissionConfig::sts65(seed, 72.0);
@@ -134,6 +136,7 @@ fn three_days_of_other_instruments_pooled_over_seeds() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn the_whole_mission_pooled_over_seeds() {
     let tallies = pooled("14.75 days", 2000, seeds(50, 5), |seed| MissionConfig::sts65(seed, 354.0));
     hold(&tallies);
@@ -147,6 +150,7 @@ fn the_whole_mission_pooled_over_seeds() {
 }
 
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn quiet_missions_have_half_the_published_error() {
     let tallies = pooled("14.75 quiet days", 2500, seeds(10, 2), |seed| {
         let mut config = MissionConfig::sts65(seed, 354.0);

@@ -61,7 +61,6 @@ pub fn derive_all(archive: &Archive) -> (Windows, Derived) {
 }
 
 /// How many seeds: a part by default, the whole with `OARE_SEEDS=all`, any number with that number.
-#[cfg(feature = "slow")]
 pub fn seeds(whole: u64, part: u64) -> u64 {
     match std::env::var("OARE_SEEDS") {
         Ok(number) => number.parse().unwrap_or(whole),

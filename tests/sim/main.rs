@@ -1,15 +1,11 @@
 //! The simulator and its physics against the sample data, which others made.
 
-#[cfg(feature = "slow")]
 mod anomalies;
 mod calibration;
-#[cfg(feature = "slow")]
 mod coverage;
-#[cfg_attr(not(feature = "slow"), allow(dead_code))] // the slow suites use more of it
 mod flown;
 mod onboard;
 mod open_cases;
-#[cfg(feature = "slow")]
 mod settling;
 
 use std::path::{Path, PathBuf};

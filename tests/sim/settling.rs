@@ -29,6 +29,7 @@ fn left(with: &Flown, without: &Flown, axis: Axis) -> [f64; 2] {
 }
 
 #[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
 fn little_is_left_of_the_settling_once_it_is_taken_away() {
     let count = seeds(10, 2);
     let pairs: Vec<[[f64; 2]; 2]> = (0..count)

@@ -149,8 +149,8 @@ mod tests {
     }
 
     /// Records of 16, 48 and 120 h of slow noise of all sizes and times, on axes that are louder and quieter.
-    #[cfg(feature = "slow")]
     #[test]
+    #[cfg_attr(not(feature = "slow"), ignore = "slow")]
     fn slow_noise_is_as_improbable_as_a_chain_as_is_said() {
         for (windows, records) in [(2300, 4000), (6900, 4000), (17_000, 1000)] {
             let clock_s: Vec<f64> = (0..windows).filter(|i| i % 400 > 30).map(|i| 25.0 * f64::from(i)).collect();

@@ -45,7 +45,16 @@ fn first(series: &Series, axis: &Axis) -> Option<(Follows, (f64, f64), AxisFound
 
 #[test]
 fn red_noise_follows_nothing() {
-    let seeds = if cfg!(feature = "slow") { 1_000 } else { 50 };
+    alarms_in_red_noise(50);
+}
+
+#[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
+fn red_noise_follows_nothing_over_many_seeds() {
+    alarms_in_red_noise(1_000);
+}
+
+fn alarms_in_red_noise(seeds: u64) {
     let mut alarms = Vec::new();
     for seed in 0..seeds {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
@@ -75,7 +84,16 @@ fn a_slope_under_red_noise_is_found() {
 
 #[test]
 fn the_error_of_a_slope_holds_whatever_the_memory() {
-    let seeds = if cfg!(feature = "slow") { 1_000 } else { 200 };
+    errors_of_slopes(200);
+}
+
+#[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
+fn the_error_of_a_slope_holds_whatever_the_memory_over_many_seeds() {
+    errors_of_slopes(1_000);
+}
+
+fn errors_of_slopes(seeds: u64) {
     for (k, memory) in MEMORIES.into_iter().enumerate() {
         let mut within = 0;
         for seed in 0..seeds {
@@ -95,7 +113,16 @@ fn the_error_of_a_slope_holds_whatever_the_memory() {
 
 #[test]
 fn a_step_is_dated_and_sized() {
-    let seeds = if cfg!(feature = "slow") { 200 } else { 20 };
+    steps(20);
+}
+
+#[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
+fn a_step_is_dated_and_sized_over_many_seeds() {
+    steps(200);
+}
+
+fn steps(seeds: u64) {
     let (mut named, mut dated, mut sized) = (0, 0, 0);
     for seed in 0..seeds {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
@@ -164,7 +191,16 @@ fn beside_reference(rng: &mut ChaCha12Rng) -> (Series, Vec<f64>) {
 
 #[test]
 fn a_scale_error_against_the_reference_is_found() {
-    let seeds = if cfg!(feature = "slow") { 200 } else { 40 };
+    scale_errors(40);
+}
+
+#[test]
+#[cfg_attr(not(feature = "slow"), ignore = "slow")]
+fn a_scale_error_against_the_reference_is_found_over_many_seeds() {
+    scale_errors(200);
+}
+
+fn scale_errors(seeds: u64) {
     let (mut named, mut within) = (0, 0);
     for seed in 0..seeds {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
