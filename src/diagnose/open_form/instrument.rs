@@ -42,6 +42,11 @@ pub(super) fn sensor(c: &mut Collector) {
     c.grid("|dT/dt|", "temperature", "changing temperature", |g| slope(g).abs());
     c.grid("(T - <T>)^2", "temperature", "extreme temperature", |g| (t[g] - mean).powi(2));
     c.grid("(T - <T>)^3", "temperature", "extreme temperature", |g| (t[g] - mean).powi(3));
+    for i in 0..3 {
+        c.grid(format!("B{} (T - <T>)", AXIS[i]), "temperature", "a strong field and an extreme temperature", |g| {
+            s.field_body_t[g][i] * (t[g] - mean)
+        });
+    }
     // Hysteresis: what a follower with slack lags behind (the play operator of Prandtl 1928).
     let behind = |series: &[f64], slack: f64| -> Vec<f64> {
         let mut follower = series[0];
