@@ -67,31 +67,6 @@ impl Grid {
         })
     }
 
-    /// A part of the grid, from one place to before another, on a grid of twice its length; by the variance of the whole. `None` where
-    /// nothing was recorded in it.
-    pub fn part(&self, from: usize, to: usize) -> Option<Self> {
-        let length = 2 * (to - from);
-        let series = self.series.each_ref().map(|series| {
-            let mut part = series[from..to].to_vec();
-            part.resize(length, Complex64::ZERO);
-            part
-        });
-        let windows = (0..to - from).filter(|i| series.iter().any(|s| s[*i] != Complex64::ZERO)).count();
-        (windows > 2).then(|| Self {
-            series,
-            variance: self.variance,
-            windows: windows as f64,
-            record: (to - from) as f64,
-            fft: FftPlanner::new().plan_fft_forward(length),
-        })
-    }
-
-    /// How loud a series is beside the variance it is measured by, but for a line of its spectrum of so much power; 1 at least.
-    pub fn beside(&self, axis: usize, power: f64) -> f64 {
-        let all: f64 = self.series[axis].iter().map(Complex64::norm_sqr).sum();
-        ((all / self.variance[axis] - power) / (self.windows - 2.0)).max(1.0)
-    }
-
     /// How loud a spectrum is about one of its lines beside that of white noise, 1 at least: from the median of the lines about it, from a
     /// half of its frequency to one and a half, which no single line moves, and as far as they are enough to say so.
     pub fn loudness(&self, spectrum: &[Complex64], m: usize) -> f64 {

@@ -15,7 +15,7 @@ const DRIFT_CYCLES: f64 = 100.0;
 const DRIFT_STEP: f64 = 0.75;
 
 /// Upper tail of a chi square.
-pub(super) fn tail(degrees: f64, x: f64) -> f64 {
+fn tail(degrees: f64, x: f64) -> f64 {
     ChiSquared::new(degrees).map_or(1.0, |d| d.sf(x))
 }
 

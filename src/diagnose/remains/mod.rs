@@ -1,8 +1,8 @@
 //! Whether structure remains when the best hypothesis has been taken away, even of a form that no dictionary has.
 //!
-//! Three questions to the whitened residual, which is white and independent from axis to axis where the hypothesis is whole:
-//! do the axes move together in some band of periods (a push along one direction of the body at whatever instants does that),
-//! is there a line, of constant or of steadily drifting period, and is there an oscillation for a while? And one to the residual itself: does it switch between two levels,
+//! Two questions to the whitened residual, which is white and independent from axis to axis where the hypothesis is whole:
+//! do the axes move together in some band of periods (a push along one direction of the body at whatever instants does that), and
+//! is there a line, of constant or of steadily drifting period? And one to the residual itself: does it switch between two levels,
 //! where slow noise would wander? Not here: what it could be.
 //!
 //! Slow noise that is no autoregression is not white behind the filter of one: what is left is louder in some band than the noise
@@ -12,7 +12,6 @@ mod band;
 mod chain;
 mod grid;
 mod line;
-mod passing;
 mod switching;
 mod together;
 
@@ -57,7 +56,6 @@ pub fn strongest(
     let asked = [
         together::together(&grid, scale_ng),
         line::line(&grid, scale_ng),
-        passing::passing(&grid, scale_ng, schedule.clock_s[0]),
         switching::switching(&binned, noise, schedule.clock_s[0]),
     ];
     let questions = asked.len() as f64;
