@@ -149,7 +149,7 @@ fn keep(out: &Path, outcomes: &[Outcome]) -> anyhow::Result<()> {
 }
 
 fn known(id: &str) -> anyhow::Result<&'static str> {
-    let all = || effect::IDS.into_iter().chain(law::LAWS.map(|(name, _)| name));
+    let all = || effect::IDS.into_iter().chain(law::all().map(|(name, _)| name));
     let there = || all().collect::<Vec<&str>>().join(", ");
     all().find(|known| *known == id).with_context(|| format!("no effect or law `{id}`; there are: {}", there()))
 }

@@ -2,7 +2,7 @@
 //!
 //! A hypothesis that leaves the noise louder about some period than the filter of two autoregressions expects may have missed a line, or
 //! the noise resonates there. A resonance is taken where, at the price of a criterion, all that is said with it is likelier than all that
-//! is said without: the best hypothesis of each, and what remains beside it. So a line stays a line.
+//! is said without: the best hypothesis of each, and what remains beside it. So a line stays a line, and what rings once no noise.
 
 use super::bursts::solve_beside_bursts;
 use super::noise::{self, AxisNoise};
@@ -42,6 +42,6 @@ fn height(scene: &Scene, library: &Library, solution: &Solution) -> f64 {
     let left = best.left(scene, &library.entries);
     let strongest =
         remains::strongest(&left, &best.noise, &scene.schedule, &scene.loudness).map_or(1.0, |r| r.probability);
-    let line = remains::probability_of_a_line(&left, &best.noise, &scene.schedule);
-    best.log_posterior - strongest.min(line).max(f64::MIN_POSITIVE).ln()
+    let oscillation = remains::probability_of_an_oscillation(&left, &best.noise, &scene.schedule);
+    best.log_posterior - strongest.min(oscillation).max(f64::MIN_POSITIVE).ln()
 }

@@ -8,6 +8,7 @@ mod limits;
 mod listed;
 mod loud;
 mod odd;
+mod passing;
 mod resonant;
 mod separating;
 mod smooth;

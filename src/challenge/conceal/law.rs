@@ -1,5 +1,7 @@
 //! Laws that no catalogue lists. A sound analyser says `unexplained`, locates them, and gives none of them a physical name.
 
+use std::f64::consts::TAU;
+
 use nalgebra::Vector3;
 use rand_chacha::ChaCha12Rng;
 
@@ -7,7 +9,7 @@ use super::draw::{between, direction, log_between, pick};
 use super::flight::{Flight, STEP_S};
 use super::force::{self, Series};
 
-/// Name and plain statement of every law.
+/// Name and plain statement of every law that is drawn.
 pub const LAWS: [(&str, &str); 16] = [
     ("unknown_eclipse_snap", "exp decay after every terminator crossing"),
     ("unknown_quadratic_rate", "wx*wz"),
@@ -26,6 +28,18 @@ pub const LAWS: [(&str, &str); 16] = [
     ("unknown_density_temperature", "density times temperature, fixed in the body"),
     ("unknown_sawtooth", "a ramp that starts again at every waking"),
 ];
+
+/// Laws that are there by name only: what is drawn stays what it was.
+pub const LAWS_BY_NAME: [(&str, &str); 3] = [
+    ("unknown_ringing", "a damped oscillation after every change of attitude"),
+    ("unknown_packet", "an oscillation that swells and fades once"),
+    ("unknown_slow_chirp", "a slow oscillation of drifting period"),
+];
+
+/// Name and plain statement of every law.
+pub fn all() -> impl Iterator<Item = (&'static str, &'static str)> {
+    LAWS.into_iter().chain(LAWS_BY_NAME)
+}
 
 /// The law's signature, of arbitrary size, ng, and where it acts.
 pub fn signature(rng: &mut ChaCha12Rng, name: &str, flight: &Flight, total: &[Vector3<f64>]) -> Series {
@@ -73,14 +87,10 @@ pub fn signature(rng: &mut ChaCha12Rng, name: &str, flight: &Flight, total: &[Ve
         "unknown_rectified_rate" => {
             along(flight.rate_change_rad_s2.iter().map(|w| (w[axis].abs() * 1e7).min(30.0)).collect(), fixed)
         }
-        "unknown_chirp" => {
-            let (period, drift) = (log_between(rng, 500.0, 4000.0), between(rng, 0.3, 0.8));
-            let shape = (0..n).map(|k| {
-                let x = k as f64 * STEP_S / flight.length_s;
-                (std::f64::consts::TAU * flight.length_s / period * (x + 0.5 * drift * x * x)).sin()
-            });
-            along(shape.collect(), fixed)
-        }
+        "unknown_chirp" => along(chirp(rng, flight, [500.0, 4000.0]), fixed),
+        "unknown_slow_chirp" => along(chirp(rng, flight, [4000.0, 20_000.0]), fixed),
+        "unknown_ringing" => along(ringing(rng, flight), fixed),
+        "unknown_packet" => along(packet(rng, flight), fixed),
         "unknown_telegraph" => along(telegraph(rng, n), fixed),
         "unknown_density_temperature" => {
             let density = force::density(flight, force::WHOLE_AIR);
@@ -157,6 +167,32 @@ fn echo(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
         }
     }
     shape
+}
+
+/// Its period at first between two, and shorter at last.
+fn chirp(rng: &mut ChaCha12Rng, flight: &Flight, [shortest_s, longest_s]: [f64; 2]) -> Vec<f64> {
+    let (period, drift) = (log_between(rng, shortest_s, longest_s), between(rng, 0.3, 0.8));
+    let phase = |k: usize| {
+        let x = k as f64 * STEP_S / flight.length_s;
+        TAU * flight.length_s / period * (x + 0.5 * drift * x * x)
+    };
+    (0..flight.times_s.len()).map(|k| phase(k).sin()).collect()
+}
+
+/// Sets in with each commanded attitude, in phase with it.
+fn ringing(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
+    let (period, tau) = (log_between(rng, 200.0, 3000.0), log_between(rng, 1000.0, 8000.0));
+    let after =
+        |from: f64, t: f64| if t < from { 0.0 } else { (-(t - from) / tau).exp() * (TAU * (t - from) / period).sin() };
+    let shape = |t: &f64| flight.attitudes.iter().map(|a| after(a.from_s, *t)).sum();
+    flight.times_s.iter().map(shape).collect()
+}
+
+fn packet(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
+    let (period, width) = (log_between(rng, 200.0, 3000.0), log_between(rng, 1500.0, 8000.0));
+    let middle = flight.start_s + flight.length_s * between(rng, 0.1, 0.9);
+    let shape = |t: &f64| (-0.5 * ((t - middle) / width).powi(2)).exp() * (TAU * (t - middle) / period).sin();
+    flight.times_s.iter().map(shape).collect()
 }
 
 fn telegraph(rng: &mut ChaCha12Rng, n: usize) -> Vec<f64> {

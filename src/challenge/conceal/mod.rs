@@ -213,7 +213,7 @@ impl Question {
             parts.push((sized.id.to_string(), parameters(&sized), series));
         }
         if order.kind == Kind::Unknown {
-            let (name, law) = *law::LAWS.iter().find(|(name, _)| ids.contains(name)).unwrap_or(&law::LAWS[0]);
+            let (name, law) = law::all().find(|(name, _)| ids.contains(name)).unwrap_or(law::LAWS[0]);
             let mut series = law::signature(rng, name, &flight, &felt);
             let factor = target(rng) / Matched::snr(&matched.white(&series)).max(1e-9);
             series.iter_mut().for_each(|a| *a *= factor);
@@ -319,7 +319,7 @@ fn ids(rng: &mut ChaCha12Rng, order: &Order) -> Vec<&'static str> {
     let count = match order.kind {
         Kind::Clean | Kind::Slow => return Vec::new(),
         Kind::Unknown => {
-            let asked = order.only.filter(|id| law::LAWS.iter().any(|(name, _)| name == id));
+            let asked = order.only.filter(|id| law::all().any(|(name, _)| name == *id));
             return vec![asked.unwrap_or_else(|| pick(rng, &law::LAWS).0)];
         }
         Kind::Two => 2,

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// What was left out of a case's simulation. Extra keys of other generators are ignored.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -30,7 +31,7 @@ pub struct Truth {
     #[serde(default)]
     pub noise_ng: [f64; 3],
     /// Slow noise per axis, ng, and its correlation time, s.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, deserialize_with = "of_this_shape", skip_serializing_if = "Option::is_none")]
     pub slow_noise: Option<([f64; 3], f64)>,
     /// The effect to be deleted from the analyser's catalogue before the run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -38,6 +39,11 @@ pub struct Truth {
     /// Seed that draws the case again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
+}
+
+/// `None` where another generator says it in another shape.
+fn of_this_shape<'de, D: Deserializer<'de>, T: DeserializeOwned>(value: D) -> Result<Option<T>, D::Error> {
+    Ok(serde_json::from_value(serde_json::Value::deserialize(value)?).ok())
 }
 
 impl Truth {
@@ -60,5 +66,20 @@ impl Truth {
     /// A law that no catalogue lists, or one deleted from it.
     pub fn is_unlisted(&self) -> bool {
         self.kind == "unknown" || self.deleted.is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slow_noise_that_another_generator_says_otherwise_is_no_error() {
+        let of =
+            |slow: &str| serde_json::from_str::<Truth>(&format!(r#"{{"case":"a","kind":"slow","slow_noise":{slow}}}"#));
+        assert_eq!(of("[[1.0,2.0,3.0],600.0]").unwrap().slow_noise, Some(([1.0, 2.0, 3.0], 600.0)));
+        assert_eq!(of(r#"{"x":{"ng":20.0,"tau_s":600.0}}"#).unwrap().slow_noise, None);
+        assert_eq!(of("20.0").unwrap().slow_noise, None);
+        assert!(of("").is_err());
     }
 }

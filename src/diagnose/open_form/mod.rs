@@ -163,9 +163,10 @@ fn standard_vector(axes: &Axes) -> Option<(Axes, f64)> {
 }
 
 /// Who fills the dictionary, in the order in which its forms stand.
-const COLLECTORS: [fn(&mut Collector); 10] = [
+const COLLECTORS: [fn(&mut Collector); 11] = [
     motion::rates,
     motion::orbit,
+    motion::late,
     surroundings::sunlight,
     history::terminator,
     surroundings::field,

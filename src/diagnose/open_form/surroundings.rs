@@ -111,5 +111,18 @@ pub(super) fn surroundings(c: &mut Collector) {
             s.drag_ng[g] * (2.0 * (ascension[g] - sun_ra)).cos()
         }],
     );
+    for delay_s in [600.0, 1800.0] {
+        let before = |g: usize| s.grid_s.partition_point(|t| *t < s.grid_s[g] - delay_s);
+        c.vectors(
+            format!("a_d of {delay_s:.0} s before, less a_d"),
+            "density",
+            "a changing drag",
+            &[&|g| s.drag_ng[before(g)] - s.drag_ng[g]],
+        );
+    }
+    for (power, said) in [(0.5, "rho^(1/2)"), (1.5, "rho^(3/2)")] {
+        let push = |g: usize| s.body[g] * s.v_m_s[g].normalize() * (rho[g] / mean_rho).powf(power);
+        c.vectors(format!("{said} v/|v|"), "density", "along the velocity", &[&push]);
+    }
     c.vectors("a_d nu", "shadow", along, &[&|g| s.drag_ng[g] * s.sunlit[g]]);
 }

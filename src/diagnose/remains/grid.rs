@@ -1,6 +1,7 @@
 //! Whitened residuals on an even grid, and their spectra.
 
 use std::f64::consts::LN_2;
+use std::ops::Range;
 
 use rustfft::num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
@@ -26,6 +27,32 @@ pub(super) struct Grid {
     /// Places from the first window to the last.
     pub record: f64,
     fft: std::sync::Arc<dyn Fft<f64>>,
+}
+
+/// A part of what is on the grid, under a taper.
+pub(super) struct Tapered {
+    /// The place it begins at.
+    pub from: usize,
+    /// Power in lines of its spectra: of white noise, 1 in the mean.
+    pub power: [Vec<f64>; 3],
+    /// Share of the taper's energy that was recorded.
+    pub recorded: f64,
+    /// Mean square of each series in it, beside that in the whole.
+    mean_square: [f64; 3],
+    /// Of what a line has in its spectrum, the share in the mean square.
+    of_a_line: f64,
+}
+
+impl Tapered {
+    /// Mean square of a series in it, beside that in the whole, without that of a line of so much power in its spectrum.
+    pub fn beside(&self, axis: usize, power: f64) -> f64 {
+        self.mean_square[axis] - self.of_a_line * power
+    }
+
+    /// Power in a line, on all axes.
+    pub fn power_of(&self, line: usize) -> f64 {
+        self.power.iter().map(|axis| axis[line]).sum()
+    }
 }
 
 /// Place of an instant.
@@ -98,6 +125,39 @@ impl Grid {
         if all > 0.0 { louder / all } else { 1.0 }
     }
 
+    /// The part from a place on, under a taper: such lines of its spectra, by a transform of at least the taper's length. `None` where nothing
+    /// was recorded.
+    pub fn tapered(
+        &self,
+        from: usize,
+        taper: &[f64],
+        transform: &dyn Fft<f64>,
+        lines: Range<usize>,
+    ) -> Option<Tapered> {
+        let places = from..(from + taper.len()).min(self.length());
+        let is_there = |i: usize| self.series.iter().any(|s| s[i] != Complex64::ZERO);
+        let (mut squares, mut fourths) = (0.0, 0.0);
+        for (w, _) in taper.iter().zip(places.clone()).filter(|(_, i)| is_there(*i)) {
+            squares += w.powi(2);
+            fourths += w.powi(4);
+        }
+        if squares <= 0.0 {
+            return None;
+        }
+        let mut mean_square = [0.0; 3];
+        let power = std::array::from_fn(|k| {
+            let norm = (squares * self.variance[k]).sqrt().recip();
+            let mut part: Vec<Complex64> =
+                taper.iter().zip(&self.series[k][places.clone()]).map(|(w, x)| x * w * norm).collect();
+            mean_square[k] = part.iter().map(Complex64::norm_sqr).sum();
+            part.resize(transform.len(), Complex64::ZERO);
+            transform.process(&mut part);
+            part[lines.clone()].iter().map(Complex64::norm_sqr).collect()
+        });
+        let recorded = squares / taper.iter().map(|w| w * w).sum::<f64>();
+        Some(Tapered { from, power, recorded, mean_square, of_a_line: 2.0 * fourths / squares.powi(2) })
+    }
+
     /// Places in all.
     pub fn length(&self) -> usize {
         self.series[0].len()
@@ -136,10 +196,16 @@ pub mod tests {
         (0..n).filter(|i| i % 170 > 4).map(|i| 1000.0 + WINDOW_STRIDE_S * i as f64).collect()
     }
 
-    /// White noise, and what is louder by `gain` in amplitude about periods of 1500 s: an autoregression of the second order.
+    /// White noise, and what is louder by `gain` in amplitude about periods of 1500 s.
     pub fn coloured(seed: u64, n: usize, gain: f64) -> Axes {
-        let radius = (-WINDOW_STRIDE_S / 1500.0f64).exp();
-        let turn = 2.0 * radius * (std::f64::consts::TAU * WINDOW_STRIDE_S / 1500.0).cos();
+        resonant(seed, n, gain, 1500.0, 1500.0)
+    }
+
+    /// White noise, and what is louder by `gain` in amplitude about a period, and forgets its phase in `tau_s`: an autoregression of the
+    /// second order.
+    pub fn resonant(seed: u64, n: usize, gain: f64, period_s: f64, tau_s: f64) -> Axes {
+        let radius = (-WINDOW_STRIDE_S / tau_s).exp();
+        let turn = 2.0 * radius * (std::f64::consts::TAU * WINDOW_STRIDE_S / period_s).cos();
         let driven = white(seed + 1_000_000, n).map(|series| {
             let mut last = [0.0; 2];
             let resonant = series.iter().map(|x| {
@@ -150,7 +216,7 @@ pub mod tests {
         });
         let mut all = white(seed, n);
         for (axis, driven) in all.iter_mut().zip(&driven) {
-            let peak = (1.0 - radius) * 2.0 * (std::f64::consts::TAU * WINDOW_STRIDE_S / 1500.0).sin();
+            let peak = (1.0 - radius) * 2.0 * (std::f64::consts::TAU * WINDOW_STRIDE_S / period_s).sin();
             axis.iter_mut().zip(driven).for_each(|(x, d)| *x += gain * peak * d);
         }
         all

@@ -73,6 +73,7 @@ fn loudest(grid: &Grid, scale_ng: [f64; 3], loudness: impl Fn(&[Complex64], usiz
         axes: sharing(amplitude),
         location: "a line of the spectrum, of its own period".into(),
         spans_s: Vec::new(),
+        then: "",
         period_s: Some(period(0.5)),
     })
 }

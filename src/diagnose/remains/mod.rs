@@ -1,8 +1,8 @@
 //! Whether structure remains when the best hypothesis has been taken away, even of a form that no dictionary has.
 //!
-//! Two questions to the whitened residual, which is white and independent from axis to axis where the hypothesis is whole:
-//! do the axes move together in some band of periods (a push along one direction of the body at whatever instants does that), and
-//! is there a line, of constant or of steadily drifting period? And one to the residual itself: does it switch between two levels,
+//! Three questions to the whitened residual, which is white and independent from axis to axis where the hypothesis is whole:
+//! do the axes move together in some band of periods (a push along one direction of the body at whatever instants does that),
+//! is there a line, of constant or of steadily drifting period, and does something oscillate for a while? And one to the residual itself: does it switch between two levels,
 //! where slow noise would wander? Not here: what it could be.
 //!
 //! Slow noise that is no autoregression is not white behind the filter of one: what is left is louder in some band than the noise
@@ -12,12 +12,14 @@ mod band;
 mod chain;
 mod grid;
 mod line;
+mod passing;
 mod switching;
 mod together;
 
 pub use self::band::loud_about_s;
 use self::grid::Grid;
-use super::noise::{AxisNoise, Binned, Loudness, Schedule};
+use self::passing::Beside;
+use super::noise::{AxisNoise, Binned, Loudness, Schedule, Whitener};
 use super::scene::Axes;
 use super::search::Left;
 
@@ -38,6 +40,8 @@ pub struct Remains {
     pub location: String,
     /// When, where it is not always there.
     pub spans_s: Vec<[f64; 2]>,
+    /// In words: what is there then.
+    pub then: &'static str,
     /// Its period, where it has one: the middle one if it drifts.
     pub period_s: Option<f64>,
 }
@@ -56,6 +60,7 @@ pub fn strongest(
     let asked = [
         together::together(&grid, scale_ng),
         line::line(&grid, scale_ng),
+        passing_of(left, noise, schedule, loudness),
         switching::switching(&binned, noise, schedule.clock_s[0]),
     ];
     let questions = asked.len() as f64;
@@ -66,11 +71,29 @@ pub fn strongest(
         .map(|r| Remains { probability: (questions * r.probability).min(1.0), ..r })
 }
 
-/// Probability of the loudest line in what a hypothesis leaves, if that is white but for the line: how well a line would explain it.
-pub fn probability_of_a_line(left: &Left, noise: &[AxisNoise; 3], schedule: &Schedule) -> f64 {
-    let found = Grid::new(&schedule.clock_s, &left.whitened)
-        .and_then(|grid| line::line_beside_white(&grid, noise.map(|n| n.rms_ng())));
-    found.map_or(1.0, |line| line.probability)
+/// What oscillates for a while. A filter of noise that resonates takes what rings for the noise it expects, so that what is asked is whitened as
+/// if it did not.
+fn passing_of(left: &Left, noise: &[AxisNoise; 3], schedule: &Schedule, loudness: &[Loudness; 3]) -> Option<Remains> {
+    let without = noise.map(|n| AxisNoise { resonance: None, ..n });
+    let whitened = std::array::from_fn(|k| match noise[k].resonance {
+        None => left.whitened[k].clone(),
+        Some(_) => Whitener::new(&without[k], schedule, &loudness[k]).whiten(&left.residual_ng[k]),
+    });
+    let grid = Grid::new(&schedule.clock_s, &whitened)?;
+    let memory_s = noise.map(|n| n.resonance.map_or(0.0, |r| r.tau_s));
+    passing::passing(&grid, without.map(|n| n.rms_ng()), Beside::Usual { memory_s }, schedule.clock_s[0])
+}
+
+/// Probability of the loudest oscillation in what a hypothesis leaves, all the time or for a while, if that is white but for it: how well one
+/// would explain what is left.
+pub fn probability_of_an_oscillation(left: &Left, noise: &[AxisNoise; 3], schedule: &Schedule) -> f64 {
+    let Some(grid) = Grid::new(&schedule.clock_s, &left.whitened) else { return 1.0 };
+    let scale_ng = noise.map(|n| n.rms_ng());
+    let asked = [
+        line::line_beside_white(&grid, scale_ng),
+        passing::passing(&grid, scale_ng, Beside::White, schedule.clock_s[0]),
+    ];
+    asked.into_iter().flatten().map(|found| found.probability).fold(1.0, f64::min)
 }
 
 /// How loud what a hypothesis leaves is, beside the noise fitted to it, at the periods at which a whitened signal lives.
@@ -88,7 +111,7 @@ fn sharing(amplitude: [f64; 3]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::noise::{Whitener, simulate};
+    use crate::diagnose::noise::simulate;
     use rand::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
 

@@ -70,6 +70,7 @@ pub(super) fn switching(binned: &[Binned; 3], noise: &[AxisNoise; 3], begins_s: 
             chain.switches
         ),
         spans_s: spans_up(&chain.up, begins_s),
+        then: "the upper level",
         period_s: None,
     })
 }

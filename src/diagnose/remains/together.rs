@@ -61,6 +61,7 @@ pub(super) fn together(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
             grid.span_s() / low as f64
         ),
         spans_s: Vec::new(),
+        then: "",
         period_s: None,
     })
 }

@@ -125,7 +125,7 @@ fn of_the_mismatch(
     let Judged { open_wins, refused, failure, .. } = judged;
     notes.extend(failure.clone());
     let chosen = judged.on_trial.as_ref().map(|(weighed, _)| *weighed);
-    let (verdict, remains) = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
+    let (verdict, remains, outdone) = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
     let tried = judged.on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
     let least = remains.as_ref().map_or(1.0, |r| r.probability);
     let (of_evidence, by_remains) = (proof.probability / EVIDENCE_SHARE, least / (1.0 - EVIDENCE_SHARE));
@@ -175,9 +175,12 @@ fn of_the_mismatch(
     answer.upper_limits = upper_limits(library, &best.frame, &best.set);
     match verdict {
         Verdict::Unexplained => {
-            answer.hypothesis = Some(match (failure, remains.filter(|_| !open_wins && !refused)) {
+            answer.hypothesis = Some(match (failure, remains.filter(|_| outdone || !open_wins && !refused)) {
                 (Some(failure), _) => of_failure(&ids(library, &best.set).join(" + "), &failure),
                 (None, Some(r)) => {
+                    if outdone {
+                        answer.located = of_what_remains(scene, &best.frame, &r, answer.located);
+                    }
                     of_remains(&r, &format!(" It remains beside {}.", ids(library, &best.set).join(" + ")))
                 }
                 (None, None) => hypothesis(library, &best, &listed, open_wins),
@@ -283,14 +286,15 @@ fn of_assumptions(scene: &Scene, library: &Library, set: &Set) -> Vec<String> {
     set.members.iter().enumerate().filter_map(assumed).collect()
 }
 
-/// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.
+/// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains. And whether it
+/// outdoes a formula: is as rare, and more than that explains.
 fn with_remains(
     scene: &Scene,
     library: &Library,
     solution: &Solution,
     (verdict, chosen): (Verdict, Option<&Weighed>),
     proof: Proof,
-) -> (Verdict, Option<Remains>) {
+) -> (Verdict, Option<Remains>, bool) {
     let weighed = chosen.unwrap_or(&solution.null);
     let left = weighed.left(scene, &library.entries);
     let remains = remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness)
@@ -299,10 +303,12 @@ fn with_remains(
     let rarer = if verdict == Verdict::Explained { REMAINS_BESIDE } else { 1.0 };
     let allowed = rarer * (1.0 - EVIDENCE_SHARE) * proof.claim;
     let overturns = remains.as_ref().is_some_and(|r| r.probability <= allowed && r.energy > REMAINS_SHARE * explained);
+    let outdone =
+        verdict == Verdict::Unexplained && overturns && remains.as_ref().is_some_and(|r| r.energy > explained);
     match verdict {
-        Verdict::Consistent | Verdict::Explained if overturns => (Verdict::Unexplained, remains),
-        Verdict::Explained => (verdict, None),
-        _ => (verdict, remains),
+        Verdict::Consistent | Verdict::Explained if overturns => (Verdict::Unexplained, remains, false),
+        Verdict::Explained => (verdict, None, false),
+        _ => (verdict, remains, outdone),
     }
 }
 
@@ -325,8 +331,7 @@ fn of_what_remains(scene: &Scene, frame: &Frame, remains: &Remains, located: Loc
     if let Some(period_s) = remains.period_s {
         per_orbit_lines.splice(0..0, locate::line_of_period(scene, frame, period_s));
     }
-    let span =
-        |[start_s, end_s]: &[f64; 2]| Interval { start_s: *start_s, end_s: *end_s, why: "the upper level".into() };
+    let span = |[start_s, end_s]: &[f64; 2]| Interval { start_s: *start_s, end_s: *end_s, why: remains.then.into() };
     let intervals = match remains.spans_s.is_empty() {
         true => located.intervals,
         false => remains.spans_s.iter().map(span).collect(),
