@@ -30,7 +30,7 @@ pub const LAWS: [(&str, &str); 16] = [
 ];
 
 /// Laws that are there by name only: what is drawn stays what it was.
-pub const LAWS_BY_NAME: [(&str, &str); 3] = [
+const LAWS_BY_NAME: [(&str, &str); 3] = [
     ("unknown_ringing", "a damped oscillation after every change of attitude"),
     ("unknown_packet", "an oscillation that swells and fades once"),
     ("unknown_slow_chirp", "a slow oscillation of drifting period"),

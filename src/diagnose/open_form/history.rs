@@ -1,9 +1,10 @@
-//! Forms with a memory: after the edges of the shadow, after logged events, after manoeuvres, with the time.
+//! Forms with a memory: after the edges of the shadow, after logged events, after manoeuvres, late behind the attitude, with the time.
 
 use super::Collector;
 use crate::diagnose::case::HALF_WINDOW_S;
 use crate::diagnose::measure::{coverage, decay};
 use crate::diagnose::scene::Scene;
+use crate::physics::Vec3;
 
 /// Instants at which a grid series crosses a level, with the sign of the crossing.
 pub(super) fn crossings(grid: &[f64], series: &[f64], level: f64) -> Vec<(f64, f64)> {
@@ -136,6 +137,37 @@ pub(super) fn events(c: &mut Collector) {
     }
 }
 
+/// What follows a series late, by a relaxation of the first order from its first value on.
+fn follower(grid_s: &[f64], series: &[Vec3], tau_s: f64) -> Vec<Vec3> {
+    let mut state = series[0];
+    let mut before_s = grid_s[0];
+    let follow = |(t, x): (&f64, &Vec3)| {
+        state = x + (state - x) * (-(t - before_s) / tau_s).exp();
+        before_s = *t;
+        state
+    };
+    grid_s.iter().zip(series).map(follow).collect()
+}
+
+/// Whatever follows the attitude late, as what the Earth or the Sun warms.
+pub(super) fn attitude(c: &mut Collector) {
+    let s = c.scene;
+    let all = 0..s.grid_s.len();
+    let radial: Vec<Vec3> = all.clone().map(|g| s.body[g] * s.r_m[g].normalize()).collect();
+    let sun: Vec<Vec3> = all.map(|g| s.body[g] * s.sun[g] * s.sunlit[g]).collect();
+    for (what, covariate, direction) in [("r/|r|", "attitude", &radial), ("nu s", "sun_angle", &sun)] {
+        for tau_s in [1000.0, 3000.0, 10_000.0] {
+            let late = follower(&s.grid_s, direction, tau_s);
+            c.several(
+                format!("x, y, z of {what} in the body, relaxing in {tau_s:.0} s"),
+                covariate,
+                "after changes of attitude",
+                &[&|g| late[g].x, &|g| late[g].y, &|g| late[g].z],
+            );
+        }
+    }
+}
+
 /// A push some time after every entry of the log, that dies away, each beside those before: delays closer than the time it lasts, so
 /// that none falls between. Of what is logged all the time the delay is anyone's guess, and the last push alone is looked at.
 fn echoes(c: &mut Collector, kind: &str, ends: &[(f64, f64)]) {
@@ -207,5 +239,20 @@ pub(super) fn clock(c: &mut Collector) {
             "a line of the spectrum",
             &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()],
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_follower_is_at_63_percent_of_a_step_after_its_time() {
+        let grid_s: Vec<f64> = (0..200).map(|i| 20.0 * f64::from(i)).collect();
+        let step: Vec<Vec3> = grid_s.iter().map(|t| Vec3::new(f64::from(u8::from(*t > 1000.0)), 1.0, 0.0)).collect();
+        let late = follower(&grid_s, &step, 400.0);
+        let at = |t: f64| late[(t / 20.0) as usize];
+        assert_eq!((at(1000.0).x, at(1000.0).y), (0.0, 1.0));
+        assert!((at(1400.0).x - (1.0 - (-1.0f64).exp())).abs() < 1e-12, "{}", at(1400.0).x);
     }
 }

@@ -166,7 +166,7 @@ fn standard_vector(axes: &Axes) -> Option<(Axes, f64)> {
 const COLLECTORS: [fn(&mut Collector); 11] = [
     motion::rates,
     motion::orbit,
-    motion::late,
+    history::attitude,
     surroundings::sunlight,
     history::terminator,
     surroundings::field,

@@ -49,37 +49,6 @@ pub(super) fn lvlh(scene: &Scene, g: usize) -> [Vec3; 3] {
     [normal.cross(&radial), normal, radial]
 }
 
-/// What follows a series late, by a relaxation of the first order from its first value on.
-fn follower(grid_s: &[f64], series: &[Vec3], tau_s: f64) -> Vec<Vec3> {
-    let mut state = series[0];
-    let mut before_s = grid_s[0];
-    let follow = |(t, x): (&f64, &Vec3)| {
-        state = x + (state - x) * (-(t - before_s) / tau_s).exp();
-        before_s = *t;
-        state
-    };
-    grid_s.iter().zip(series).map(follow).collect()
-}
-
-/// Whatever follows the attitude late, as what the Earth or the Sun warms.
-pub(super) fn late(c: &mut Collector) {
-    let s = c.scene;
-    let all = 0..s.grid_s.len();
-    let radial: Vec<Vec3> = all.clone().map(|g| s.body[g] * s.r_m[g].normalize()).collect();
-    let sun: Vec<Vec3> = all.map(|g| s.body[g] * s.sun[g] * s.sunlit[g]).collect();
-    for (what, covariate, direction) in [("r/|r|", "attitude", &radial), ("nu s", "sun_angle", &sun)] {
-        for tau_s in [1000.0, 3000.0, 10_000.0] {
-            let late = follower(&s.grid_s, direction, tau_s);
-            c.several(
-                format!("x, y, z of {what} in the body, relaxing in {tau_s:.0} s"),
-                covariate,
-                "after changes of attitude",
-                &[&|g| late[g].x, &|g| late[g].y, &|g| late[g].z],
-            );
-        }
-    }
-}
-
 pub(super) fn orbit(c: &mut Collector) {
     let s = c.scene;
     let (u, noon) = angles(s);
@@ -125,19 +94,4 @@ pub(super) fn orbit(c: &mut Collector) {
     );
     let fixed = |k: usize| move |g: usize| s.body[g].column(k).into_owned();
     c.vectors("a constant in inertial axes", "attitude", "changes of attitude", &[&fixed(0), &fixed(1), &fixed(2)]);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_follower_is_at_63_percent_of_a_step_after_its_time() {
-        let grid_s: Vec<f64> = (0..200).map(|i| 20.0 * f64::from(i)).collect();
-        let step: Vec<Vec3> = grid_s.iter().map(|t| Vec3::new(f64::from(u8::from(*t > 1000.0)), 1.0, 0.0)).collect();
-        let late = follower(&grid_s, &step, 400.0);
-        let at = |t: f64| late[(t / 20.0) as usize];
-        assert_eq!((at(1000.0).x, at(1000.0).y), (0.0, 1.0));
-        assert!((at(1400.0).x - (1.0 - (-1.0f64).exp())).abs() < 1e-12, "{}", at(1400.0).x);
-    }
 }

@@ -1,21 +1,21 @@
 //! Is there a line in the spectrum, of constant or of steadily drifting period?
 
 use super::grid::Grid;
-use super::{Remains, sharing};
+use super::{Remains, mostly, sharing};
 use crate::diagnose::case::WINDOW_STRIDE_S;
 use crate::math::shared_work;
 use rustfft::num_complex::Complex64;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Shortest period of a line that is looked for, s, and the fewest cycles in the record.
-const LINE_S: f64 = 200.0;
+pub(super) const LINE_S: f64 = 200.0;
 const CYCLES_MIN: usize = 8;
 /// Drifts of a line looked for: cycles by which its phase departs from that of a steady one over the record, and their spacing.
 const DRIFT_CYCLES: f64 = 100.0;
 const DRIFT_STEP: f64 = 0.75;
 
 /// Upper tail of a chi square.
-fn tail(degrees: f64, x: f64) -> f64 {
+pub(super) fn tail(degrees: f64, x: f64) -> f64 {
     ChiSquared::new(degrees).map_or(1.0, |d| d.sf(x))
 }
 
@@ -63,17 +63,15 @@ fn loudest(grid: &Grid, scale_ng: [f64; 3], loudness: impl Fn(&[Complex64], usiz
     let (energy, m, cycles, power) = of_all.reduce(first_loudest)?;
     let trials = f64::from(2 * steps + 1) * (last + 1 - CYCLES_MIN) as f64;
     let amplitude: [f64; 3] = std::array::from_fn(|k| power[k].sqrt() * scale_ng[k]);
-    let loudest = (0..3).max_by(|a, b| amplitude[*a].total_cmp(&amplitude[*b])).unwrap_or(0);
     let period = |x: f64| (m as f64 / grid.span_s() + 2.0 * cycles * x / (grid.record * WINDOW_STRIDE_S)).recip();
     Some(Remains {
         probability: (tail(6.0, energy) * trials).min(1.0),
         energy,
         form: format!("an oscillation, its period {:.0} s at first and {:.0} s at last", period(0.0), period(1.0)),
-        axis: format!("mostly {}", ["x", "y", "z"][loudest]),
+        axis: mostly(amplitude),
         axes: sharing(amplitude),
         location: "a line of the spectrum, of its own period".into(),
-        spans_s: Vec::new(),
-        then: "",
+        intervals: Vec::new(),
         period_s: Some(period(0.5)),
     })
 }

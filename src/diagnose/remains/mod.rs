@@ -19,6 +19,7 @@ mod together;
 pub use self::band::loud_about_s;
 use self::grid::Grid;
 use self::passing::Beside;
+use super::answer::Interval;
 use super::noise::{AxisNoise, Binned, Loudness, Schedule, Whitener};
 use super::scene::Axes;
 use super::search::Left;
@@ -38,10 +39,8 @@ pub struct Remains {
     pub axes: Vec<String>,
     /// In words: where it lives.
     pub location: String,
-    /// When, where it is not always there.
-    pub spans_s: Vec<[f64; 2]>,
-    /// In words: what is there then.
-    pub then: &'static str,
+    /// When, where it is not always there, and what is there then.
+    pub intervals: Vec<Interval>,
     /// Its period, where it has one: the middle one if it drifts.
     pub period_s: Option<f64>,
 }
@@ -99,6 +98,12 @@ pub fn probability_of_an_oscillation(left: &Left, noise: &[AxisNoise; 3], schedu
 /// How loud what a hypothesis leaves is, beside the noise fitted to it, at the periods at which a whitened signal lives.
 pub fn loudness_under(left: &Left, schedule: &Schedule, signal: &Axes) -> f64 {
     Grid::new(&schedule.clock_s, &left.whitened).map_or(1.0, |grid| grid.loudness_under(&schedule.clock_s, signal))
+}
+
+/// The axis with the largest share in it.
+fn mostly(amplitude: [f64; 3]) -> String {
+    let named = ["x", "y", "z"].iter().zip(amplitude);
+    format!("mostly {}", named.max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |(name, _)| *name))
 }
 
 /// Axes that carry at least a twentieth of the energy.

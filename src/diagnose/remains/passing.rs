@@ -4,11 +4,12 @@
 //! alike. So what oscillates in one part is measured by what most parts have at the same period, whatever the spectrum.
 
 use super::grid::{Grid, Tapered};
-use super::{Remains, sharing};
+use super::line::{LINE_S, tail};
+use super::{Remains, mostly, sharing};
+use crate::diagnose::answer::Interval;
 use crate::diagnose::case::WINDOW_STRIDE_S;
 use crate::math::shared_work;
 use rustfft::FftPlanner;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::ops::Range;
 
 /// Times, in half windows, in which what is looked for decays: 7 min to 3.6 h.
@@ -18,13 +19,14 @@ const LENGTH: usize = 4;
 const STEPS: usize = 4;
 /// Decay times after which a part has nothing of another.
 const APART: usize = 2;
-/// Shortest period that is looked for, s, and longest; half an oscillation at least fits in a decay time.
-const PERIODS_S: [f64; 2] = [200.0, 4000.0];
-/// Share of a part's weight that must have been recorded.
+/// Shortest period that is looked for, s, and longest: below that of the orbit, which any effect leaves in one attitude and not in another.
+/// Half an oscillation at least fits in a decay time.
+const PERIODS_S: [f64; 2] = [LINE_S, 4000.0];
+/// Share of a part's weight that must have been recorded, for its lines to be as narrow as those of the others.
 const RECORDED: f64 = 0.5;
-/// Share of the parts, the least loud, that say how loud the noise is.
+/// Share of the parts, the least loud, that say how loud the noise is: what rings several times may fill a quarter of the record.
 const LEAST_LOUD: f64 = 0.75;
-/// Fewest of those that are independent: begin a decay time after one another.
+/// Fewest of those that are independent, which begin a decay time after one another: of fewer, nothing that happens is improbable enough.
 const SURE: f64 = 3.0;
 
 /// What an oscillation is measured by.
@@ -51,19 +53,17 @@ pub(super) fn passing(grid: &Grid, scale_ng: [f64; 3], noise: Beside, first_s: f
     let trials: usize = of_each.iter().map(|(trials, _)| trials).sum();
     let found = of_each.into_iter().filter_map(|(_, found)| found).reduce(first_least)?;
     // Minus twice the logarithm of three probabilities: a chi square of six degrees (R. A. Fisher).
-    let tail = ChiSquared::new(6.0).map_or(1.0, |d| d.sf(-2.0 * found.log_tail));
+    let of_one = tail(6.0, -2.0 * found.log_tail);
     let amplitude: [f64; 3] = std::array::from_fn(|k| found.power[k].sqrt() * scale_ng[k]);
-    let loudest = (0..3).max_by(|a, b| amplitude[*a].total_cmp(&amplitude[*b])).unwrap_or(0);
-    let at = |place: usize| first_s + place as f64 * WINDOW_STRIDE_S;
+    let [start_s, end_s] = [found.places.start, found.places.end].map(|place| first_s + place as f64 * WINDOW_STRIDE_S);
     Some(Remains {
-        probability: (tail * trials as f64).min(1.0),
+        probability: (of_one * trials as f64).min(1.0),
         energy: 2.0 * found.beside.iter().sum::<f64>(),
         form: format!("an oscillation for a while, its period about {:.0} s", found.period_s),
-        axis: format!("mostly {}", ["x", "y", "z"][loudest]),
+        axis: mostly(amplitude),
         axes: sharing(amplitude),
         location: "an oscillation that is not there all the time".into(),
-        spans_s: vec![[at(found.places.start), at(found.places.end)]],
-        then: "the oscillation",
+        intervals: vec![Interval { start_s, end_s, why: "the oscillation".into() }],
         period_s: Some(found.period_s),
     })
 }
@@ -82,6 +82,7 @@ fn least_probable(grid: &Grid, decay: usize, noise: Beside) -> (usize, Option<Pa
         |from| grid.tapered(from, &taper, &*transform, lines.clone()).filter(|part| part.recorded > RECORDED);
     let parts: Vec<Tapered> = begins.filter_map(recorded).collect();
     let of_line = |(i, line): (usize, usize)| {
+        // Beside the noise fitted, which is the same in all of them.
         let loudest = parts.iter().max_by(|a, b| a.power_of(i).total_cmp(&b.power_of(i)))?;
         let away = |part: &&Tapered| part.from.abs_diff(loudest.from) > APART * decay;
         let others: Vec<&Tapered> = parts.iter().filter(away).collect();
@@ -125,6 +126,12 @@ fn mean(mut all: Vec<f64>) -> f64 {
 mod tests {
     use super::super::grid::tests::{clock, coloured, resonant, white};
     use super::*;
+    use crate::diagnose::scene::Axes;
+
+    fn found(clock: &[f64], axes: &Axes) -> Remains {
+        let noise = Beside::Usual { memory_s: [0.0; 3] };
+        Grid::new(clock, axes).and_then(|grid| passing(&grid, [1.0; 3], noise, clock[0])).unwrap()
+    }
 
     #[test]
     fn what_rings_for_a_while_is_found_where_it_rings() {
@@ -138,11 +145,10 @@ mod tests {
                 let since = t - began;
                 axes[2][i] += 2.0 * (-since / 4000.0).exp() * (std::f64::consts::TAU * since / 700.0).sin();
             }
-            let found = Grid::new(&clock, &axes)
-                .and_then(|grid| passing(&grid, [1.0; 3], Beside::Usual { memory_s: [0.0; 3] }, clock[0]))
-                .unwrap();
-            let [from, to] = found.spans_s[0];
-            let right = found.probability < 1e-4 && found.axis == "mostly z" && from < began + 2000.0 && to > began;
+            let found = found(&clock, &axes);
+            let when = &found.intervals[0];
+            let about = when.start_s < began + 2000.0 && when.end_s > began;
+            let right = found.probability < 1e-4 && found.axis == "mostly z" && about;
             found_in += usize::from(right && (found.period_s.unwrap() / 700.0 - 1.0).abs() < 0.1);
         }
         assert!(found_in >= 18, "{found_in} of 20");
@@ -158,9 +164,7 @@ mod tests {
             louder.iter_mut().for_each(|axis| axis[1000..1600].iter_mut().for_each(|x| *x *= 1.5));
             let narrow = resonant(2_000 + seed, clock.len(), 4.0, 900.0, 4000.0);
             for axes in [white(1_000 + seed, clock.len()), coloured(seed, clock.len(), 1.4), narrow, louder] {
-                let found = Grid::new(&clock, &axes)
-                    .and_then(|grid| passing(&grid, [1.0; 3], Beside::Usual { memory_s: [0.0; 3] }, clock[0]))
-                    .unwrap();
+                let found = found(&clock, &axes);
                 assert!(found.probability > 1e-4, "{seed}: {found:?}");
             }
         }

@@ -9,6 +9,7 @@
 
 use super::chain::Chain;
 use super::{Remains, sharing};
+use crate::diagnose::answer::Interval;
 use crate::diagnose::noise::{AxisNoise, BIN_S, Binned};
 use crate::math::shared_work;
 
@@ -69,23 +70,22 @@ pub(super) fn switching(binned: &[Binned; 3], noise: &[AxisNoise; 3], begins_s: 
             "two levels, {} switches; on the average {on_s:.0} s at s = 1 and {off_s:.0} s at s = 0",
             chain.switches
         ),
-        spans_s: spans_up(&chain.up, begins_s),
-        then: "the upper level",
+        intervals: intervals_up(&chain.up, begins_s),
         period_s: None,
     })
 }
 
 /// When it is more likely up than down.
-fn spans_up(up: &[f64], begins_s: f64) -> Vec<[f64; 2]> {
-    let mut spans: Vec<[f64; 2]> = Vec::new();
+fn intervals_up(up: &[f64], begins_s: f64) -> Vec<Interval> {
+    let mut intervals: Vec<Interval> = Vec::new();
     for (i, _) in up.iter().enumerate().filter(|(_, up)| **up > 0.5) {
-        let [from_s, to_s] = [i, i + 1].map(|bin| begins_s + bin as f64 * BIN_S);
-        match spans.last_mut() {
-            Some(last) if last[1] == from_s => last[1] = to_s,
-            _ => spans.push([from_s, to_s]),
+        let [start_s, end_s] = [i, i + 1].map(|bin| begins_s + bin as f64 * BIN_S);
+        match intervals.last_mut() {
+            Some(last) if last.end_s == start_s => last.end_s = end_s,
+            _ => intervals.push(Interval { start_s, end_s, why: "the upper level".into() }),
         }
     }
-    spans
+    intervals
 }
 
 #[cfg(test)]
@@ -137,8 +137,8 @@ mod tests {
     fn a_push_that_switches_is_found_with_its_size_and_slow_noise_is_none() {
         let found = switching(&record(1, 0.0, 80.0), &[NOISE; 3], 0.0).unwrap();
         // Each level lasts 5,000 s in the mean.
-        let up_s: f64 = found.spans_s.iter().map(|[from, to]| to - from).sum();
-        assert!(found.spans_s.len() > 5 && (30_000.0..100_000.0).contains(&up_s), "{:?}", found.spans_s);
+        let up_s: f64 = found.intervals.iter().map(|up| up.end_s - up.start_s).sum();
+        assert!(found.intervals.len() > 5 && (30_000.0..100_000.0).contains(&up_s), "{:?}", found.intervals);
         assert!(found.probability < 1e-6 && found.axes == ["y"], "{found:?}");
         let size: f64 = found.axis.split(", ").nth(1).and_then(|x| x.parse().ok()).unwrap();
         assert!((size.abs() - 80.0).abs() < 8.0, "{found:?}");

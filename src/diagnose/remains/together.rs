@@ -60,8 +60,7 @@ pub(super) fn together(grid: &Grid, scale_ng: [f64; 3]) -> Option<Remains> {
             grid.span_s() / high as f64,
             grid.span_s() / low as f64
         ),
-        spans_s: Vec::new(),
-        then: "",
+        intervals: Vec::new(),
         period_s: None,
     })
 }

@@ -24,8 +24,6 @@ pub struct Judged<'a> {
     pub failure: Option<String>,
     /// An open form is better than every set of listed effects.
     pub open_wins: bool,
-    /// The best set of listed effects cannot be believed.
-    pub refused: bool,
 }
 
 /// Judges; `listed` are the sets of listed effects that can be believed, best first.
@@ -57,5 +55,5 @@ pub fn judge<'a>(
         Some(_) => (Verdict::Unexplained, on_trial),
         None => (verdict, on_trial),
     };
-    Judged { verdict, on_trial, failure, open_wins, refused }
+    Judged { verdict, on_trial, failure, open_wins }
 }

@@ -24,7 +24,7 @@ use self::nearest::nearest;
 use self::proportion::of_proportion;
 use self::stands::tried;
 use self::unnamed::{hypothesis, of_failure, of_remains};
-use super::answer::{Diagnosis, Interval, Located, Source, Verdict};
+use super::answer::{Diagnosis, Located, Source, Verdict};
 use super::bursts::OUT;
 use super::case::{Event, SPIKE};
 use super::catalogue::Effect;
@@ -122,12 +122,11 @@ fn of_the_mismatch(
     notes.extend(of_colour(solution.statistic() - proof.statistic));
     let listed = credible(scene, library, &solution.listed, &mut notes);
     let judged = judge(scene, library, solution, &listed, proof);
-    let Judged { open_wins, refused, failure, .. } = judged;
+    let Judged { open_wins, failure, .. } = judged;
     notes.extend(failure.clone());
     let chosen = judged.on_trial.as_ref().map(|(weighed, _)| *weighed);
-    let (verdict, remains, outdone) = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
+    let (verdict, least, remains) = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
     let tried = judged.on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
-    let least = remains.as_ref().map_or(1.0, |r| r.probability);
     let (of_evidence, by_remains) = (proof.probability / EVIDENCE_SHARE, least / (1.0 - EVIDENCE_SHARE));
     let overall = of_evidence.min(by_remains).min(1.0);
     let false_alarm_from = Some(if by_remains < of_evidence { Source::Remains } else { proof.source });
@@ -146,7 +145,7 @@ fn of_the_mismatch(
     let Some(weighed) = chosen else {
         answer.notes = notes;
         answer.located = unclaimed(scene, library, &null_frame, solution, std::mem::take(&mut answer.located));
-        if let Some(r) = remains.filter(|_| verdict == Verdict::Unexplained) {
+        if let Some(r) = remains {
             answer.located = of_what_remains(scene, &null_frame, &r, answer.located);
             answer.hypothesis = Some(of_remains(&r, ""));
         }
@@ -175,12 +174,10 @@ fn of_the_mismatch(
     answer.upper_limits = upper_limits(library, &best.frame, &best.set);
     match verdict {
         Verdict::Unexplained => {
-            answer.hypothesis = Some(match (failure, remains.filter(|_| outdone || !open_wins && !refused)) {
+            answer.hypothesis = Some(match (failure, remains) {
                 (Some(failure), _) => of_failure(&ids(library, &best.set).join(" + "), &failure),
                 (None, Some(r)) => {
-                    if outdone {
-                        answer.located = of_what_remains(scene, &best.frame, &r, answer.located);
-                    }
+                    answer.located = of_what_remains(scene, &best.frame, &r, answer.located);
                     of_remains(&r, &format!(" It remains beside {}.", ids(library, &best.set).join(" + ")))
                 }
                 (None, None) => hypothesis(library, &best, &listed, open_wins),
@@ -286,15 +283,15 @@ fn of_assumptions(scene: &Scene, library: &Library, set: &Set) -> Vec<String> {
     set.members.iter().enumerate().filter_map(assumed).collect()
 }
 
-/// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains. And whether it
-/// outdoes a formula: is as rare, and more than that explains.
+/// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains. The verdict, how
+/// probable what remains is, and what remains where that is what is to be told: beside a formula, where it is more than that explains.
 fn with_remains(
     scene: &Scene,
     library: &Library,
     solution: &Solution,
     (verdict, chosen): (Verdict, Option<&Weighed>),
     proof: Proof,
-) -> (Verdict, Option<Remains>, bool) {
+) -> (Verdict, f64, Option<Remains>) {
     let weighed = chosen.unwrap_or(&solution.null);
     let left = weighed.left(scene, &library.entries);
     let remains = remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness)
@@ -302,13 +299,13 @@ fn with_remains(
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
     let rarer = if verdict == Verdict::Explained { REMAINS_BESIDE } else { 1.0 };
     let allowed = rarer * (1.0 - EVIDENCE_SHARE) * proof.claim;
-    let overturns = remains.as_ref().is_some_and(|r| r.probability <= allowed && r.energy > REMAINS_SHARE * explained);
-    let outdone =
-        verdict == Verdict::Unexplained && overturns && remains.as_ref().is_some_and(|r| r.energy > explained);
-    match verdict {
-        Verdict::Consistent | Verdict::Explained if overturns => (Verdict::Unexplained, remains, false),
-        Verdict::Explained => (verdict, None, false),
-        _ => (verdict, remains, outdone),
+    let share = if verdict == Verdict::Unexplained { 1.0 } else { REMAINS_SHARE };
+    let probability = remains.as_ref().map_or(1.0, |r| r.probability);
+    match remains.filter(|r| r.probability <= allowed && r.energy > share * explained) {
+        Some(told) => (Verdict::Unexplained, probability, Some(told)),
+        // What is too little to overturn an explanation says nothing against it.
+        None if verdict == Verdict::Explained => (verdict, 1.0, None),
+        None => (verdict, probability, None),
     }
 }
 
@@ -331,11 +328,7 @@ fn of_what_remains(scene: &Scene, frame: &Frame, remains: &Remains, located: Loc
     if let Some(period_s) = remains.period_s {
         per_orbit_lines.splice(0..0, locate::line_of_period(scene, frame, period_s));
     }
-    let span = |[start_s, end_s]: &[f64; 2]| Interval { start_s: *start_s, end_s: *end_s, why: remains.then.into() };
-    let intervals = match remains.spans_s.is_empty() {
-        true => located.intervals,
-        false => remains.spans_s.iter().map(span).collect(),
-    };
+    let intervals = if remains.intervals.is_empty() { located.intervals } else { remains.intervals.clone() };
     Located { axes: remains.axes.clone(), intervals, per_orbit_lines, ..located }
 }
 
