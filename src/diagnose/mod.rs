@@ -14,6 +14,7 @@ pub mod catalogue;
 pub mod design;
 mod earlier;
 pub mod error;
+pub mod instants;
 pub mod live;
 pub mod locate;
 pub mod measure;

@@ -5,6 +5,7 @@
 //! is said without: the best hypothesis of each, and what remains beside it. So a line stays a line, and what rings once no noise.
 
 use super::bursts::solve_beside_bursts;
+use super::instants::recurring;
 use super::noise::{self, AxisNoise};
 use super::remains;
 use super::scene::Scene;
@@ -40,8 +41,9 @@ pub fn solve_at_its_order(
 fn height(scene: &Scene, library: &Library, solution: &Solution) -> f64 {
     let best = solution.best();
     let left = best.left(scene, &library.entries);
-    let strongest =
-        remains::strongest(&left, &best.noise, &scene.schedule, &scene.loudness).map_or(1.0, |r| r.probability);
-    let oscillation = remains::probability_of_an_oscillation(&left, &best.noise, &scene.schedule);
+    let recurring = recurring(scene);
+    let strongest = remains::strongest(&left, &best.noise, &scene.schedule, &scene.loudness, &recurring)
+        .map_or(1.0, |r| r.probability);
+    let oscillation = remains::probability_of_an_oscillation(&left, &best.noise, &scene.schedule, &recurring);
     best.log_posterior - strongest.min(oscillation).max(f64::MIN_POSITIVE).ln()
 }

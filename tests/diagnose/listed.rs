@@ -3,6 +3,7 @@
 
 use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
+use oare_ground::diagnose::measure::window_means;
 use oare_ground::diagnose::{Settings, diagnose};
 
 /// The effects of a concealed case, and the answer to it has them exactly.
@@ -26,4 +27,32 @@ fn a_leak_after_the_only_entry_of_its_kind_is_a_leak() {
 #[test]
 fn a_magnetic_sensitivity_of_any_size_is_one() {
     is_named(Kind::Two, 1_120_089, &["bias_step", "magnetic_sensitivity"]);
+}
+
+/// Two seconds, where manoeuvres are fast enough to show them: here a quiet record of slower ones.
+#[test]
+fn a_clock_that_is_two_seconds_out_is_told() {
+    for offset_s in [2.0, -1.5] {
+        let order = Order { kind: Kind::Clean, seed: 3, only: None, manner: Manner::default() };
+        let mut case = super::case(&draw_order(&order).files);
+        let simulation = case.simulation.clone();
+        for k in 0..3 {
+            let seen =
+                |ahead_s| window_means(&simulation.clock_s, &simulation.a_ng[k], &case.recording.clock_s, ahead_s);
+            let (now, late) = (seen(0.0), seen(offset_s));
+            for ((x, now), late) in case.recording.a_ng[k].iter_mut().zip(now).zip(late) {
+                *x = late + 0.05 * (*x - now);
+            }
+        }
+        let found = diagnose(&case, &Settings::default()).unwrap();
+        assert_eq!(
+            (found.verdict, super::ids(&found)),
+            (Verdict::Explained, vec!["time_offset"]),
+            "{:?}",
+            found.hypothesis
+        );
+        let told = &found.effects[0].parameters[0];
+        assert!((told.value - offset_s).abs() < 4.0 * told.sigma, "{told:?}");
+        assert!(told.sigma < 0.5, "{told:?}");
+    }
 }

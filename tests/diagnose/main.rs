@@ -13,6 +13,7 @@ mod resonant;
 mod separating;
 mod smooth;
 mod trial;
+mod unlisted;
 mod unlogged;
 mod wind;
 

@@ -34,3 +34,34 @@ fn what_rings_once_is_told_with_when() {
         assert!((when.start_s - onset_s).abs() < 2000.0 && when.end_s > onset_s, "{seed}: {when:?} {onset_s}");
     }
 }
+
+/// Rings that are faint each, after every entry of the log of some kind and with the same phase: told with after what.
+#[test]
+fn what_rings_after_every_entry_of_the_log_is_told_with_after_what() {
+    const ENTRIES_S: [f64; 5] = [9_000.0, 31_700.0, 52_300.0, 78_100.0, 104_900.0];
+    let order = Order { kind: Kind::Clean, seed: 2, only: None, manner: Manner::default() };
+    let mut files = draw_order(&order).files;
+    let first_s = super::case(&files).recording.clock_s[0];
+    let log = &mut files.iter_mut().find(|(name, _)| name == "events.csv").unwrap().1;
+    let entries = ENTRIES_S.map(|since_s| first_s + since_s);
+    let lines: String = entries.iter().map(|t| format!("{t},60,airlock,\n")).collect();
+    log.extend(lines.as_bytes());
+    let mut case = super::case(&files);
+    let clock_s = &case.recording.clock_s;
+    let y = &mut case.recording.a_ng[1];
+    let mean = y.iter().sum::<f64>() / y.len() as f64;
+    let rms = (y.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / y.len() as f64).sqrt();
+    for (x, t) in y.iter_mut().zip(clock_s) {
+        for since_s in entries.iter().map(|at| t - at).filter(|since_s| *since_s > 0.0) {
+            *x += rms * (-since_s / 2500.0).exp() * (TAU * since_s / 800.0).sin();
+        }
+    }
+    let answer = diagnose(&case, &Settings::default()).unwrap();
+    assert_eq!(answer.verdict, Verdict::Unexplained, "{:?}", answer.notes);
+    assert!(answer.effects.is_empty(), "{:?}", super::ids(&answer));
+    let told = answer.hypothesis.unwrap();
+    assert!(told.formula.contains("a ringing after every start of airlock"), "{}", told.formula);
+    assert_eq!(told.axis, "mostly y");
+    let when: Vec<f64> = answer.located.intervals.iter().map(|i| i.start_s).collect();
+    assert_eq!(when, entries);
+}

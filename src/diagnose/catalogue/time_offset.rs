@@ -32,9 +32,12 @@ pub const EFFECT: Effect = Effect {
 /// Largest offset, s.
 const OFFSET_S_MAX: f64 = 600.0;
 
+/// From half a second on, which a fast manoeuvre shows, each so near the next that an offset between them is a few standard errors away at most.
 fn grid(_: &Scene) -> Vec<Theta> {
-    let steps =
-        [5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 75.0, 90.0, 105.0, 120.0, 150.0, 180.0, 240.0, 300.0, 400.0, 500.0];
+    let steps = [
+        0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 15.0, 20.0, 30.0, 40.0, 50.0, 60.0, 75.0, 90.0, 105.0,
+        120.0, 150.0, 180.0, 240.0, 300.0, 400.0, 500.0,
+    ];
     steps.iter().flat_map(|s| [[*s, 0.0], [-s, 0.0]]).collect()
 }
 

@@ -2,21 +2,10 @@
 
 use super::Collector;
 use crate::diagnose::case::HALF_WINDOW_S;
+use crate::diagnose::instants::{manoeuvres, terminators};
 use crate::diagnose::measure::{coverage, decay};
 use crate::diagnose::scene::Scene;
 use crate::physics::Vec3;
-
-/// Instants at which a grid series crosses a level, with the sign of the crossing.
-pub(super) fn crossings(grid: &[f64], series: &[f64], level: f64) -> Vec<(f64, f64)> {
-    let mut out = Vec::new();
-    for i in 1..series.len() {
-        let (a, b) = (series[i - 1] - level, series[i] - level);
-        if a * b <= 0.0 && a != b {
-            out.push((grid[i - 1] + (grid[i] - grid[i - 1]) * a / (a - b), (b - a).signum()));
-        }
-    }
-    out
-}
 
 /// Decays after instants, each forgetting the one before: exp(-(t - last)/tau).
 pub(super) fn since(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f64> {
@@ -50,7 +39,7 @@ fn decays(scene: &Scene, instants: &[(f64, f64)], tau_s: f64, ends: impl Fn(usiz
 
 pub(super) fn terminator(c: &mut Collector) {
     let s = c.scene;
-    let all = crossings(&s.grid_s, &s.sunlit, 0.5);
+    let all = terminators(s);
     let only = |sign: f64| all.iter().filter(|x| x.1 == sign).map(|x| (x.0, 1.0)).collect::<Vec<_>>();
     let place = "after the edges of the shadow";
     for tau in [60.0, 150.0, 300.0, 600.0, 1200.0, 2400.0] {
@@ -121,12 +110,7 @@ pub(super) fn events(c: &mut Collector) {
             );
         }
     }
-    let speed: Vec<f64> = s.wdot_rad_s2.iter().map(|w| w.norm()).collect();
-    let mut sorted = speed.clone();
-    sorted.sort_by(f64::total_cmp);
-    let level = 8.0 * sorted[sorted.len() / 2] + 1e-7;
-    let ends: Vec<(f64, f64)> =
-        crossings(&s.grid_s, &speed, level).into_iter().filter(|x| x.1 < 0.0).map(|x| (x.0, 1.0)).collect();
+    let ends: Vec<(f64, f64)> = manoeuvres(s).into_iter().filter(|x| x.1 < 0.0).map(|x| (x.0, 1.0)).collect();
     for tau in [300.0, 1000.0, 3000.0, 10_000.0].into_iter().filter(|tau| !begins_once(s, &ends, *tau)) {
         c.windows(
             format!("exp(-(time since manoeuvre)/{tau:.0} s)"),
@@ -156,15 +140,17 @@ pub(super) fn attitude(c: &mut Collector) {
     let radial: Vec<Vec3> = all.clone().map(|g| s.body[g] * s.r_m[g].normalize()).collect();
     let sun: Vec<Vec3> = all.map(|g| s.body[g] * s.sun[g] * s.sunlit[g]).collect();
     for (what, covariate, direction) in [("r/|r|", "attitude", &radial), ("nu s", "sun_angle", &sun)] {
+        let mut members = Vec::new();
         for tau_s in [1000.0, 3000.0, 10_000.0] {
-            let late = follower(&s.grid_s, direction, tau_s);
-            c.several(
-                format!("x, y, z of {what} in the body, relaxing in {tau_s:.0} s"),
-                covariate,
-                "after changes of attitude",
-                &[&|g| late[g].x, &|g| late[g].y, &|g| late[g].z],
-            );
+            let mut late = direction.clone();
+            // What warms may warm another, and that pushes.
+            for after in ["relaxing", "relaxing twice"] {
+                late = follower(&s.grid_s, &late, tau_s);
+                let parts = [0, 1, 2].map(|k| s.measure_scalar(|g| late[g][k]));
+                members.push((format!("x, y, z of {what} in the body, {after} in {tau_s:.0} s"), parts.to_vec()));
+            }
         }
+        c.several_family(covariate, "after changes of attitude", members);
     }
 }
 
@@ -222,6 +208,13 @@ pub(super) fn clock(c: &mut Collector) {
     let t: Vec<f64> = s.clock_s().iter().map(|t| (t - start) / (end - start) * 2.0 - 1.0).collect();
     c.windows("t^2", "time", "the whole record, t from -1 to 1", t.iter().map(|x| x * x).collect());
     c.windows("t^3", "time", "the whole record, t from -1 to 1", t.iter().map(|x| x.powi(3)).collect());
+    c.several(
+        "t, t^2",
+        "time",
+        "the whole record, t from its first window",
+        &[&|g| s.grid_s[g] - start, &|g| (s.grid_s[g] - start).powi(2)],
+    );
+    c.family("time", "from an instant of no log on", creeps(s));
     for hours in [6.0, 8.0, 12.0, 24.0, 48.0] {
         let rate = std::f64::consts::TAU / (hours * 3600.0);
         c.several(
@@ -240,6 +233,21 @@ pub(super) fn clock(c: &mut Collector) {
             &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()],
         );
     }
+}
+
+/// What creeps with the logarithm of time, as materials do under a load, from an instant of no log on.
+fn creeps(s: &Scene) -> Vec<(String, Vec<f64>)> {
+    const ONSETS: usize = 32;
+    let [start, end] = s.span_s();
+    let mut members = Vec::new();
+    for i in 0..ONSETS {
+        let onset = start + (end - start) * i as f64 / ONSETS as f64;
+        for tau in [100.0, 1000.0, 10_000.0] {
+            let creep = s.clock_s().iter().map(|t| ((t - onset).max(0.0) / tau).ln_1p()).collect();
+            members.push((format!("log(1 + max(t - {onset:.0} s, 0)/{tau:.0} s)"), creep));
+        }
+    }
+    members
 }
 
 #[cfg(test)]

@@ -68,6 +68,14 @@ pub(super) fn sensor(c: &mut Collector) {
             (format!("m{} behind itself by a slack of {slack:.0} ng", AXIS[i]), behind(&m[i], slack))
         });
         c.family("modelled_signal", "reversals of the modelled signal", slacks);
+        let mut size: Vec<f64> = m[i].iter().map(|x| x.abs()).collect();
+        size.sort_by(f64::total_cmp);
+        let beyond = [0.3, 0.5, 0.7, 0.85].map(|share| {
+            let level = size[((size.len() - 1) as f64 * share) as usize];
+            let beyond = m[i].iter().map(|x| x - x.clamp(-level, level)).collect();
+            (format!("m{} beyond {level:.0} ng", AXIS[i]), beyond)
+        });
+        c.family("modelled_signal", place, beyond);
     }
     c.vectors(
         "m (T - <T>)",

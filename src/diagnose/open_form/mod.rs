@@ -111,14 +111,31 @@ impl Collector<'_> {
         location: &'static str,
         parts: &[&dyn Fn(usize) -> f64],
     ) {
-        let (series, deviations): (Vec<Vec<f64>>, Vec<f64>) =
-            parts.iter().filter_map(|f| standard(&self.scene.measure_scalar(f))).unzip();
-        if series.len() == parts.len() {
-            let columns: Vec<Raw> = series
-                .iter()
-                .flat_map(|s| (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| s.clone()))))
-                .collect();
-            self.columns(formula, covariate, location, (columns, deviations));
+        let series: Vec<Vec<f64>> = parts.iter().map(|f| self.scene.measure_scalar(f)).collect();
+        self.several_family(covariate, location, [(formula.into(), series)]);
+    }
+
+    /// Forms of several series at the windows, each with a coefficient on every body axis; one of the forms may hold.
+    fn several_family(
+        &mut self,
+        covariate: &'static str,
+        location: &'static str,
+        members: impl IntoIterator<Item = (String, Vec<Vec<f64>>)>,
+    ) {
+        let mut said = Said { covariate, location, formulas: Vec::new(), deviations: Vec::new() };
+        let mut shapes = Vec::new();
+        for (formula, parts) in members {
+            let (series, deviations): (Vec<Vec<f64>>, Vec<f64>) = parts.iter().filter_map(|s| standard(s)).unzip();
+            if series.len() < parts.len() {
+                continue;
+            }
+            let on_each_axis = |s: &Vec<f64>| [0, 1, 2].map(|k| std::array::from_fn(|j| (j == k).then(|| s.clone())));
+            said.formulas.push(formula);
+            said.deviations.push(deviations);
+            shapes.push(Shape::Columns(series.iter().flat_map(on_each_axis).collect()));
+        }
+        if !shapes.is_empty() {
+            self.atoms.push(Atom { said, shapes });
         }
     }
 

@@ -86,6 +86,7 @@ pub(super) fn orbit(c: &mut Collector) {
             }
         }
     }
+    changing_lines(c, &u);
     c.vectors(
         "a constant in the local vertical frame",
         "attitude",
@@ -94,4 +95,21 @@ pub(super) fn orbit(c: &mut Collector) {
     );
     let fixed = |k: usize| move |g: usize| s.body[g].column(k).into_owned();
     c.vectors("a constant in inertial axes", "attitude", "changes of attitude", &[&fixed(0), &fixed(1), &fixed(2)]);
+}
+
+/// The line of the orbit from an instant of no log on: what changes the temperature or the air about the sensor changes its line.
+fn changing_lines(c: &mut Collector, u: &[f64]) {
+    const ONSETS: usize = 16;
+    let s = c.scene;
+    let [start, end] = s.span_s();
+    let line = [s.measure_scalar(|g| u[g].sin()), s.measure_scalar(|g| u[g].cos())];
+    let members = (2..=ONSETS - 2).map(|i| {
+        let onset = start + (end - start) * i as f64 / ONSETS as f64;
+        let from = |series: &Vec<f64>| {
+            let windows = series.iter().zip(s.clock_s());
+            windows.map(|(x, t)| if *t >= onset { *x } else { 0.0 }).collect()
+        };
+        (format!("sin u, cos u from {onset:.0} s on"), line.iter().map(from).collect())
+    });
+    c.several_family("argument_of_latitude", "from an instant of no log on", members);
 }

@@ -75,18 +75,15 @@ pub(super) fn surroundings(c: &mut Collector) {
     c.grid("sin(latitude)", "latitude", place, |g| latitude[g]);
     c.grid("sin^2(latitude)", "latitude", place, |g| latitude[g] * latitude[g]);
     c.grid("|sin(latitude)|", "latitude", place, |g| latitude[g].abs());
-    c.several(
-        "sin(longitude), cos(longitude)",
-        "longitude",
-        place,
-        &[&|g| longitude[g].sin(), &|g| longitude[g].cos()],
-    );
-    c.several(
-        "sin(2 longitude), cos(2 longitude)",
-        "longitude",
-        place,
-        &[&|g| (2.0 * longitude[g]).sin(), &|g| (2.0 * longitude[g]).cos()],
-    );
+    for k in 1..=4 {
+        let n = f64::from(k);
+        c.several(
+            format!("sin {k} longitude, cos {k} longitude"),
+            "longitude",
+            place,
+            &[&|g| (n * longitude[g]).sin(), &|g| (n * longitude[g]).cos()],
+        );
+    }
     for k in 1..=3 {
         let n = k as f64;
         c.several(

@@ -33,9 +33,10 @@ pub(super) struct Grid {
 pub(super) struct Tapered {
     /// The place it begins at.
     pub from: usize,
-    /// Power in lines of its spectra: of white noise, 1 in the mean.
-    pub power: [Vec<f64>; 3],
-    /// Share of the taper's energy that was recorded.
+    /// Lines of its spectra: of white noise, of unit power in the mean.
+    spectra: [Vec<Complex64>; 3],
+    /// Energy of the taper where it was recorded, and its share in all of it.
+    pub energy: f64,
     pub recorded: f64,
     /// Mean square of each series in it, beside that in the whole.
     mean_square: [f64; 3],
@@ -49,9 +50,14 @@ impl Tapered {
         self.mean_square[axis] - self.of_a_line * power
     }
 
-    /// Power in a line, on all axes.
-    pub fn power_of(&self, line: usize) -> f64 {
-        self.power.iter().map(|axis| axis[line]).sum()
+    /// A line of one of its spectra.
+    pub fn line(&self, axis: usize, line: usize) -> Complex64 {
+        self.spectra[axis][line]
+    }
+
+    /// Power in a line: of white noise, 1 in the mean.
+    pub fn power(&self, axis: usize, line: usize) -> f64 {
+        self.spectra[axis][line].norm_sqr()
     }
 }
 
@@ -145,17 +151,24 @@ impl Grid {
             return None;
         }
         let mut mean_square = [0.0; 3];
-        let power = std::array::from_fn(|k| {
+        let spectra = std::array::from_fn(|k| {
             let norm = (squares * self.variance[k]).sqrt().recip();
             let mut part: Vec<Complex64> =
                 taper.iter().zip(&self.series[k][places.clone()]).map(|(w, x)| x * w * norm).collect();
             mean_square[k] = part.iter().map(Complex64::norm_sqr).sum();
             part.resize(transform.len(), Complex64::ZERO);
             transform.process(&mut part);
-            part[lines.clone()].iter().map(Complex64::norm_sqr).collect()
+            part[lines.clone()].to_vec()
         });
         let recorded = squares / taper.iter().map(|w| w * w).sum::<f64>();
-        Some(Tapered { from, power, recorded, mean_square, of_a_line: 2.0 * fourths / squares.powi(2) })
+        Some(Tapered {
+            from,
+            spectra,
+            energy: squares,
+            recorded,
+            mean_square,
+            of_a_line: 2.0 * fourths / squares.powi(2),
+        })
     }
 
     /// Places in all.

@@ -1,9 +1,10 @@
 //! Whether structure remains when the best hypothesis has been taken away, even of a form that no dictionary has.
 //!
-//! Three questions to the whitened residual, which is white and independent from axis to axis where the hypothesis is whole:
+//! Four questions to the whitened residual, which is white and independent from axis to axis where the hypothesis is whole:
 //! do the axes move together in some band of periods (a push along one direction of the body at whatever instants does that),
-//! is there a line, of constant or of steadily drifting period, and does something oscillate for a while? And one to the residual itself: does it switch between two levels,
-//! where slow noise would wander? Not here: what it could be.
+//! is there a line, of constant or of steadily drifting period, does something oscillate for a while, and does something ring after
+//! what recurs? And one to the residual itself: does it switch between two levels, where slow noise would wander? Not here: what it
+//! could be.
 //!
 //! Slow noise that is no autoregression is not white behind the filter of one: what is left is louder in some band than the noise
 //! fitted. Lines, and findings, are measured by how loud it is where they are.
@@ -12,14 +13,17 @@ mod band;
 mod chain;
 mod grid;
 mod line;
+mod parts;
 mod passing;
+mod ringing;
 mod switching;
 mod together;
 
 pub use self::band::loud_about_s;
 use self::grid::Grid;
-use self::passing::Beside;
+use self::parts::Beside;
 use super::answer::Interval;
+use super::instants::Recurring;
 use super::noise::{AxisNoise, Binned, Loudness, Schedule, Whitener};
 use super::scene::Axes;
 use super::search::Left;
@@ -51,15 +55,18 @@ pub fn strongest(
     noise: &[AxisNoise; 3],
     schedule: &Schedule,
     loudness: &[Loudness; 3],
+    recurring: &[Recurring],
 ) -> Option<Remains> {
     // Too few windows have no bands, too few bins no levels; too many are of another kind of record.
     let grid = Grid::new(&schedule.clock_s, &left.whitened)?;
     let scale_ng = noise.map(|n| n.rms_ng());
     let binned = std::array::from_fn(|k| Binned::new(&left.residual_ng[k], &noise[k], schedule, &loudness[k]));
+    let [passing, ringing] = not_all_the_time(left, noise, schedule, loudness, recurring);
     let asked = [
         together::together(&grid, scale_ng),
         line::line(&grid, scale_ng),
-        passing_of(left, noise, schedule, loudness),
+        passing,
+        ringing,
         switching::switching(&binned, noise, schedule.clock_s[0]),
     ];
     let questions = asked.len() as f64;
@@ -70,27 +77,45 @@ pub fn strongest(
         .map(|r| Remains { probability: (questions * r.probability).min(1.0), ..r })
 }
 
-/// What oscillates for a while. A filter of noise that resonates takes what rings for the noise it expects, so that what is asked is whitened as
-/// if it did not.
-fn passing_of(left: &Left, noise: &[AxisNoise; 3], schedule: &Schedule, loudness: &[Loudness; 3]) -> Option<Remains> {
+/// What oscillates for a while, and what rings. A filter of noise that resonates takes what rings for the noise it expects, so that what is asked
+/// is whitened as if it did not.
+fn not_all_the_time(
+    left: &Left,
+    noise: &[AxisNoise; 3],
+    schedule: &Schedule,
+    loudness: &[Loudness; 3],
+    recurring: &[Recurring],
+) -> [Option<Remains>; 2] {
     let without = noise.map(|n| AxisNoise { resonance: None, ..n });
     let whitened = std::array::from_fn(|k| match noise[k].resonance {
         None => left.whitened[k].clone(),
         Some(_) => Whitener::new(&without[k], schedule, &loudness[k]).whiten(&left.residual_ng[k]),
     });
-    let grid = Grid::new(&schedule.clock_s, &whitened)?;
-    let memory_s = noise.map(|n| n.resonance.map_or(0.0, |r| r.tau_s));
-    passing::passing(&grid, without.map(|n| n.rms_ng()), Beside::Usual { memory_s }, schedule.clock_s[0])
+    let Some(grid) = Grid::new(&schedule.clock_s, &whitened) else { return [None, None] };
+    let beside = Beside::Usual { memory_s: noise.map(|n| n.resonance.map_or(0.0, |r| r.tau_s)) };
+    let (scale_ng, first_s) = (without.map(|n| n.rms_ng()), schedule.clock_s[0]);
+    let parts = parts::of_all_decays(&grid);
+    [
+        passing::passing(&parts, scale_ng, beside, first_s),
+        ringing::ringing(&parts, scale_ng, beside, first_s, recurring),
+    ]
 }
 
 /// Probability of the loudest oscillation in what a hypothesis leaves, all the time or for a while, if that is white but for it: how well one
 /// would explain what is left.
-pub fn probability_of_an_oscillation(left: &Left, noise: &[AxisNoise; 3], schedule: &Schedule) -> f64 {
+pub fn probability_of_an_oscillation(
+    left: &Left,
+    noise: &[AxisNoise; 3],
+    schedule: &Schedule,
+    recurring: &[Recurring],
+) -> f64 {
     let Some(grid) = Grid::new(&schedule.clock_s, &left.whitened) else { return 1.0 };
     let scale_ng = noise.map(|n| n.rms_ng());
+    let parts = parts::of_all_decays(&grid);
     let asked = [
         line::line_beside_white(&grid, scale_ng),
-        passing::passing(&grid, scale_ng, Beside::White, schedule.clock_s[0]),
+        passing::passing(&parts, scale_ng, Beside::White, schedule.clock_s[0]),
+        ringing::ringing(&parts, scale_ng, Beside::White, schedule.clock_s[0], recurring),
     ];
     asked.into_iter().flatten().map(|found| found.probability).fold(1.0, f64::min)
 }
@@ -140,7 +165,9 @@ mod tests {
                 std::array::from_fn(|k| simulate(&noise, &schedule, &loudness[k], || StandardNormal.sample(&mut rng)));
             let whitened =
                 std::array::from_fn(|k| Whitener::new(&noise, &schedule, &loudness[k]).whiten(&residual_ng[k]));
-            let found = strongest(&Left { residual_ng, whitened }, &[noise; 3], &schedule, &loudness);
+            let now_and_then = [5_000.0, 31_000.0, 58_500.0, 90_000.0].to_vec();
+            let recurring = [Recurring { what: "change".into(), at_s: now_and_then }];
+            let found = strongest(&Left { residual_ng, whitened }, &[noise; 3], &schedule, &loudness, &recurring);
             assert!(found.is_none_or(|r| r.probability > 1e-3));
         }
     }

@@ -29,6 +29,7 @@ use super::bursts::OUT;
 use super::case::{Event, SPIKE};
 use super::catalogue::Effect;
 use super::design::Frame;
+use super::instants::recurring;
 use super::locate;
 use super::model::{self, MemberFit};
 use super::noise::{AxisNoise, Contradicted, Resonance};
@@ -294,7 +295,7 @@ fn with_remains(
 ) -> (Verdict, f64, Option<Remains>) {
     let weighed = chosen.unwrap_or(&solution.null);
     let left = weighed.left(scene, &library.entries);
-    let remains = remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness)
+    let remains = remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness, &recurring(scene))
         .map(|r| Remains { probability: (proof.chances * r.probability).min(1.0), ..r });
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
     let rarer = if verdict == Verdict::Explained { REMAINS_BESIDE } else { 1.0 };

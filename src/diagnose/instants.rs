@@ -1,0 +1,97 @@
+//! Instants at which something happens to the vehicle, over and over: the edges of the shadow, changes of attitude, entries of the log.
+
+use super::case::WINDOW_STRIDE_S;
+use super::scene::Scene;
+
+/// A change of attitude begins where the angular acceleration passes so many times its median, and what is no more than rounding, rad/s2.
+const MANOEUVRE: f64 = 8.0;
+const ROUNDING_RAD_S2: f64 = 1e-7;
+/// A change of attitude is over when it does not go on for so long, s: it is turned by one push and stopped by another.
+const STILL_S: f64 = 1800.0;
+/// Most instants that are looked at as one series of them: what happens oftener happens all the time.
+const OFTEN: usize = 64;
+
+/// What happens over and over, in words, and when.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recurring {
+    /// In words.
+    pub what: String,
+    /// When, s, in order, at least twice in the record.
+    pub at_s: Vec<f64>,
+}
+
+/// Instants at which a grid series crosses a level, with the sign of the crossing.
+pub fn crossings(grid: &[f64], series: &[f64], level: f64) -> Vec<(f64, f64)> {
+    let mut out = Vec::new();
+    for i in 1..series.len() {
+        let (a, b) = (series[i - 1] - level, series[i] - level);
+        if a * b <= 0.0 && a != b {
+            out.push((grid[i - 1] + (grid[i] - grid[i - 1]) * a / (a - b), (b - a).signum()));
+        }
+    }
+    out
+}
+
+/// Edges of the shadow: 1 into the light, -1 out of it.
+pub fn terminators(s: &Scene) -> Vec<(f64, f64)> {
+    crossings(&s.grid_s, &s.sunlit, 0.5)
+}
+
+/// Where the vehicle begins to be turned or stopped, 1, and where that ends, -1.
+pub fn manoeuvres(s: &Scene) -> Vec<(f64, f64)> {
+    let acceleration: Vec<f64> = s.wdot_rad_s2.iter().map(|w| w.norm()).collect();
+    let mut sorted = acceleration.clone();
+    sorted.sort_by(f64::total_cmp);
+    crossings(&s.grid_s, &acceleration, MANOEUVRE * sorted[sorted.len() / 2] + ROUNDING_RAD_S2)
+}
+
+/// All that recurs in a record.
+pub fn recurring(s: &Scene) -> Vec<Recurring> {
+    let [start, end] = s.span_s();
+    let mut found = Vec::new();
+    let mut add = |what: String, mut at_s: Vec<f64>| {
+        at_s.retain(|t| (start..end).contains(t));
+        at_s.sort_by(f64::total_cmp);
+        if (2..=OFTEN).contains(&at_s.len()) {
+            found.push(Recurring { what, at_s });
+        }
+    };
+    let of_sign = |all: &[(f64, f64)], sign: f64| all.iter().filter(|x| x.1 == sign).map(|x| x.0).collect::<Vec<f64>>();
+    let edges = terminators(s);
+    add("sunrise".into(), of_sign(&edges, 1.0));
+    add("sunset".into(), of_sign(&edges, -1.0));
+    let pushes = manoeuvres(s);
+    let [begins, ends] = [1.0, -1.0].map(|sign| of_sign(&pushes, sign));
+    let apart = |a: f64, b: f64| b - a > STILL_S;
+    let first = begins.iter().enumerate().filter(|(i, t)| *i == 0 || apart(begins[i - 1], **t)).map(|(_, t)| *t);
+    let last = ends.iter().enumerate().filter(|(i, t)| ends.get(i + 1).is_none_or(|next| apart(**t, *next)));
+    add("start of a change of attitude".into(), first.collect());
+    add("end of a change of attitude".into(), last.map(|(_, t)| *t).collect());
+    let mut kinds: Vec<&str> = s.case.events.iter().map(|e| e.kind.as_str()).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    for kind in kinds {
+        let spans = s.case.spans(kind);
+        add(format!("start of {kind}"), spans.iter().map(|x| x[0]).collect());
+        // Ends that follow their starts by the same time are the same instants.
+        let lengths = spans.iter().map(|x| x[1] - x[0]);
+        let [shortest, longest] = lengths.fold([f64::INFINITY, 0.0], |[low, high], x| [x.min(low), x.max(high)]);
+        if longest - shortest > WINDOW_STRIDE_S {
+            add(format!("end of {kind}"), spans.iter().map(|x| x[1]).collect());
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_is_crossed_between_two_points_up_and_down() {
+        let grid = [0.0, 10.0, 20.0, 30.0, 40.0];
+        let found = crossings(&grid, &[0.0, 0.0, 1.0, 1.0, 0.2], 0.6);
+        let expected = [(16.0, 1.0), (35.0, -1.0)];
+        assert!(found.len() == 2 && found.iter().zip(expected).all(|(a, b)| (a.0 - b.0).abs() < 1e-9 && a.1 == b.1));
+    }
+}
