@@ -9,7 +9,9 @@ use std::sync::Arc;
 use rustfft::{Fft, FftPlanner};
 
 use super::grid::{Grid, Tapered};
-use super::line::LINE_S;
+use super::line::{LINE_S, tail};
+use super::{Remains, mostly, sharing};
+use crate::diagnose::answer::Interval;
 use crate::diagnose::case::WINDOW_STRIDE_S;
 use crate::math::shared_work;
 
@@ -81,8 +83,9 @@ impl<'a> Parts<'a> {
         self.decay as f64 * WINDOW_STRIDE_S
     }
 
-    pub fn period_s(&self, line: usize) -> f64 {
-        self.transform.len() as f64 * WINDOW_STRIDE_S / line as f64
+    /// Period of a line, the first of those looked at or a later one.
+    pub fn period_s(&self, i: usize) -> f64 {
+        self.transform.len() as f64 * WINDOW_STRIDE_S / (self.lines.start + i) as f64
     }
 
     /// How many independent ones the least loud of so many others are as sure as; `None` where they are too few.
@@ -91,18 +94,19 @@ impl<'a> Parts<'a> {
         (independent >= SURE).then_some(independent)
     }
 
-    /// Power of an oscillation on each axis beside the noise at its period, and the logarithm of its probability, all axes together.
-    /// `alone`: beside white noise. `others` are without it, and so sure.
-    pub fn improbable(
+    /// An oscillation in a line, the first of those looked at or a later one: its power on each axis, and that beside white noise as loud as
+    /// there. `others` are without it, and so sure.
+    pub fn oscillation(
         &self,
-        (line, alone): (usize, [f64; 3]),
+        i: usize,
+        (power, alone): ([f64; 3], [f64; 3]),
         (others, sure_as): (&[&Tapered], f64),
         noise: Beside,
-    ) -> ([f64; 3], f64) {
-        match noise {
+    ) -> Oscillation {
+        let (beside, log_tail) = match noise {
             Beside::White => (alone, -alone.iter().sum::<f64>()),
             Beside::Usual { memory_s } => {
-                let usual = |k: usize| mean(others.iter().map(|part| part.power(k, line)).collect());
+                let usual = |k: usize| mean(others.iter().map(|part| part.power(k, i)).collect());
                 let beside: [f64; 3] = std::array::from_fn(|k| alone[k] / usual(k));
                 // An exponential number beside the mean of others, of which none is independent while the noise still knows its phase: an F
                 // distribution with two degrees and twice as many as are.
@@ -110,6 +114,40 @@ impl<'a> Parts<'a> {
                 let log_tail = |k: usize| -as_sure_as[k] * (beside[k] / as_sure_as[k]).ln_1p();
                 (beside, (0..3).map(log_tail).sum())
             }
+        };
+        Oscillation { log_tail, power, beside, period_s: self.period_s(i) }
+    }
+}
+
+/// An oscillation: logarithm of its probability, all axes together, power on each, alone and beside the noise there, and period.
+pub(super) struct Oscillation {
+    pub log_tail: f64,
+    power: [f64; 3],
+    beside: [f64; 3],
+    pub period_s: f64,
+}
+
+impl Oscillation {
+    /// As what remains, of so many that were looked at.
+    pub fn remains(
+        &self,
+        trials: usize,
+        scale_ng: [f64; 3],
+        (form, location): (String, String),
+        intervals: Vec<Interval>,
+    ) -> Remains {
+        // Minus twice the logarithm of three probabilities: a chi square of six degrees (R. A. Fisher).
+        let of_one = tail(6.0, -2.0 * self.log_tail);
+        let amplitude: [f64; 3] = std::array::from_fn(|k| self.power[k].sqrt() * scale_ng[k]);
+        Remains {
+            probability: (of_one * trials as f64).min(1.0),
+            energy: 2.0 * self.beside.iter().sum::<f64>(),
+            form,
+            axis: mostly(amplitude),
+            axes: sharing(amplitude),
+            location,
+            intervals,
+            period_s: Some(self.period_s),
         }
     }
 }

@@ -2,49 +2,33 @@
 
 use std::ops::Range;
 
+use super::Remains;
 use super::grid::Tapered;
-use super::line::tail;
-use super::parts::{APART, Beside, Parts, STEPS};
-use super::{Remains, mostly, sharing};
+use super::parts::{APART, Beside, Oscillation, Parts, STEPS};
 use crate::diagnose::answer::Interval;
 use crate::diagnose::case::WINDOW_STRIDE_S;
 use crate::math::shared_work;
 
-/// An oscillation for a while: logarithm of its probability, all axes together, power on each beside the noise there, period, and places.
-struct Passing {
-    log_tail: f64,
-    power: [f64; 3],
-    beside: [f64; 3],
-    period_s: f64,
-    places: Range<usize>,
-}
+/// An oscillation for a while, and its places.
+type Passing = (Oscillation, Range<usize>);
 
 /// The least probable oscillation in any part of the record.
 pub(super) fn passing(parts: &[Parts], scale_ng: [f64; 3], noise: Beside, first_s: f64) -> Option<Remains> {
     let of_each = shared_work::map(parts, |parts| least_probable(parts, noise));
     let trials: usize = of_each.iter().map(|(trials, _)| trials).sum();
-    let found = of_each.into_iter().filter_map(|(_, found)| found).reduce(first_least)?;
-    // Minus twice the logarithm of three probabilities: a chi square of six degrees (R. A. Fisher).
-    let of_one = tail(6.0, -2.0 * found.log_tail);
-    let amplitude: [f64; 3] = std::array::from_fn(|k| found.power[k].sqrt() * scale_ng[k]);
-    let [start_s, end_s] = [found.places.start, found.places.end].map(|place| first_s + place as f64 * WINDOW_STRIDE_S);
-    Some(Remains {
-        probability: (of_one * trials as f64).min(1.0),
-        energy: 2.0 * found.beside.iter().sum::<f64>(),
-        form: format!("an oscillation for a while, its period about {:.0} s", found.period_s),
-        axis: mostly(amplitude),
-        axes: sharing(amplitude),
-        location: "an oscillation that is not there all the time".into(),
-        intervals: vec![Interval { start_s, end_s, why: "the oscillation".into() }],
-        period_s: Some(found.period_s),
-    })
+    let (found, places) = of_each.into_iter().filter_map(|(_, found)| found).reduce(first_least)?;
+    let form = format!("an oscillation for a while, its period about {:.0} s", found.period_s);
+    let location = "an oscillation that is not there all the time".into();
+    let [start_s, end_s] = [places.start, places.end].map(|place| first_s + place as f64 * WINDOW_STRIDE_S);
+    let when = Interval { start_s, end_s, why: "the oscillation".into() };
+    Some(found.remains(trials, scale_ng, (form, location), vec![when]))
 }
 
 /// How many lines of how many parts were looked at, and the least probable of those that decay in such a time.
 fn least_probable(parts: &Parts, noise: Beside) -> (usize, Option<Passing>) {
     let decay = parts.decay;
     let power_of = |part: &Tapered, i: usize| (0..3).map(|k| part.power(k, i)).sum::<f64>();
-    let of_line = |(i, line): (usize, usize)| {
+    let of_line = |i: usize| {
         // Beside the noise fitted, which is the same in all of them.
         let loudest = parts.all.iter().max_by(|a, b| power_of(a, i).total_cmp(&power_of(b, i)))?;
         let away = |part: &&Tapered| part.from.abs_diff(loudest.from) > APART * decay;
@@ -52,16 +36,15 @@ fn least_probable(parts: &Parts, noise: Beside) -> (usize, Option<Passing>) {
         let sure_as = Parts::sure_as(others.len())?;
         let power: [f64; 3] = std::array::from_fn(|k| loudest.power(k, i));
         let alone = std::array::from_fn(|k| power[k] / loudest.beside(k, power[k]).max(1.0));
-        let (beside, log_tail) = parts.improbable((i, alone), (&others, sure_as), noise);
         let places = loudest.from.saturating_sub(decay / STEPS)..loudest.from + APART * decay;
-        Some(Passing { log_tail, beside, power, period_s: parts.period_s(line), places })
+        Some((parts.oscillation(i, (power, alone), (&others, sure_as), noise), places))
     };
     let trials = parts.all.len() * parts.lines.len();
-    (trials, parts.lines.clone().enumerate().filter_map(of_line).reduce(first_least))
+    (trials, (0..parts.lines.len()).filter_map(of_line).reduce(first_least))
 }
 
 fn first_least(best: Passing, next: Passing) -> Passing {
-    if next.log_tail < best.log_tail { next } else { best }
+    if next.0.log_tail < best.0.log_tail { next } else { best }
 }
 
 #[cfg(test)]

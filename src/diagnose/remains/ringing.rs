@@ -8,10 +8,9 @@ use std::f64::consts::TAU;
 
 use rustfft::num_complex::Complex64;
 
+use super::Remains;
 use super::grid::Tapered;
-use super::line::tail;
-use super::parts::{APART, Beside, LENGTH, Parts};
-use super::{Remains, mostly, sharing};
+use super::parts::{APART, Beside, LENGTH, Oscillation, Parts};
 use crate::diagnose::answer::Interval;
 use crate::diagnose::case::WINDOW_STRIDE_S;
 use crate::diagnose::instants::Recurring;
@@ -23,15 +22,8 @@ const WORTH_WEIGHING: f64 = 8.0;
 /// Longest time in which noise forgets its phase, s: four times the longest period of a resonance.
 const FORGOTTEN_S: f64 = 9600.0;
 
-/// What rings: logarithm of its probability, all axes together, power on each, alone and beside the noise there, period, decay time, after what.
-struct Ringing<'a> {
-    log_tail: f64,
-    power: [f64; 3],
-    beside: [f64; 3],
-    period_s: f64,
-    decay_s: f64,
-    after: &'a Recurring,
-}
+/// What rings, in what time it dies away, s, and after what.
+type Ringing<'a> = (Oscillation, f64, &'a Recurring);
 
 /// The least probable ringing after any of the recurring instants.
 pub(super) fn ringing(
@@ -46,29 +38,19 @@ pub(super) fn ringing(
         rings.map(|rings| rings.least_probable(noise)).collect::<Vec<(usize, Option<Ringing>)>>()
     });
     let trials: usize = of_each.iter().flatten().map(|(trials, _)| trials).sum();
-    let found = of_each.into_iter().flatten().filter_map(|(_, found)| found).reduce(first_least)?;
-    // Minus twice the logarithm of three probabilities: a chi square of six degrees (R. A. Fisher).
-    let of_one = tail(6.0, -2.0 * found.log_tail);
-    let amplitude: [f64; 3] = std::array::from_fn(|k| found.power[k].sqrt() * scale_ng[k]);
-    let rings = |at: &f64| Interval { start_s: *at, end_s: at + APART as f64 * found.decay_s, why: "it rings".into() };
-    let what = &found.after.what;
-    Some(Remains {
-        probability: (of_one * trials as f64).min(1.0),
-        energy: 2.0 * found.beside.iter().sum::<f64>(),
-        form: format!(
-            "a ringing after every {what}, its period about {:.0} s, dying away in about {:.0} s",
-            found.period_s, found.decay_s
-        ),
-        axis: mostly(amplitude),
-        axes: sharing(amplitude),
-        location: format!("a ringing after every {what}, {} times", found.after.at_s.len()),
-        intervals: found.after.at_s.iter().map(rings).collect(),
-        period_s: Some(found.period_s),
-    })
+    let found = of_each.into_iter().flatten().filter_map(|(_, found)| found);
+    let (found, decay_s, Recurring { what, at_s }) = found.reduce(first_least)?;
+    let form = format!(
+        "a ringing after every {what}, its period about {:.0} s, dying away in about {decay_s:.0} s",
+        found.period_s
+    );
+    let location = format!("after every {what}, {} of them", at_s.len());
+    let rings = |at: &f64| Interval { start_s: *at, end_s: at + APART as f64 * decay_s, why: "it rings".into() };
+    Some(found.remains(trials, scale_ng, (form, location), at_s.iter().map(rings).collect()))
 }
 
 fn first_least<'a>(best: Ringing<'a>, next: Ringing<'a>) -> Ringing<'a> {
-    if next.log_tail < best.log_tail { next } else { best }
+    if next.0.log_tail < best.0.log_tail { next } else { best }
 }
 
 /// The parts of a record that begin at instants that recur.
@@ -112,24 +94,22 @@ impl<'p, 'a> Rings<'p, 'a> {
     /// How many lines were looked at, and the least probable.
     fn least_probable(&self, noise: Beside) -> (usize, Option<Ringing<'a>>) {
         let kept = if let Beside::Usual { memory_s } = noise { memory_s.map(|s| self.kept(s)) } else { [1.0; 3] };
-        let of_line = |(i, line): (usize, usize)| {
-            let period_s = self.parts.period_s(line);
-            let power = self.power(i, TAU / period_s);
+        let of_line = |i: usize| {
+            let power = self.power(i);
             let loud = self.mean_square(i);
             let alone: [f64; 3] = std::array::from_fn(|k| power[k] / loud[k].max(1.0) / kept[k]);
-            if alone.iter().sum::<f64>() < WORTH_WEIGHING {
-                return None;
-            }
-            let (beside, log_tail) = self.parts.improbable((i, alone), (&self.others, self.sure_as), noise);
-            let (decay_s, after) = (self.parts.decay_s(), self.after);
-            Some(Ringing { log_tail, power, beside, period_s, decay_s, after })
+            (alone.iter().sum::<f64>() >= WORTH_WEIGHING).then(|| {
+                let others = (&self.others[..], self.sure_as);
+                (self.parts.oscillation(i, (power, alone), others, noise), self.parts.decay_s(), self.after)
+            })
         };
-        let lines = self.parts.lines.clone();
-        (lines.len(), lines.enumerate().filter_map(of_line).reduce(first_least))
+        let lines = self.parts.lines.len();
+        (lines, (0..lines).filter_map(of_line).reduce(first_least))
     }
 
     /// Power on each axis of a line, all rings added up, each turned back by its phase since its instant: of white noise, 1 in the mean.
-    fn power(&self, i: usize, rate_rad_s: f64) -> [f64; 3] {
+    fn power(&self, i: usize) -> [f64; 3] {
+        let rate_rad_s = TAU / self.parts.period_s(i);
         let mut sum = [Complex64::ZERO; 3];
         for (part, late_s, left) in &self.all {
             let turned = Complex64::from_polar(left * part.energy.sqrt(), -rate_rad_s * late_s);
