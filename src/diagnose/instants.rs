@@ -2,6 +2,7 @@
 
 use super::case::WINDOW_STRIDE_S;
 use super::scene::Scene;
+use crate::math::robust::median;
 
 /// A change of attitude begins where the angular acceleration passes so many times its median, and what is no more than rounding, rad/s2.
 const MANOEUVRE: f64 = 8.0;
@@ -21,7 +22,7 @@ pub struct Recurring {
 }
 
 /// Instants at which a grid series crosses a level, with the sign of the crossing.
-pub fn crossings(grid: &[f64], series: &[f64], level: f64) -> Vec<(f64, f64)> {
+fn crossings(grid: &[f64], series: &[f64], level: f64) -> Vec<(f64, f64)> {
     let mut out = Vec::new();
     for i in 1..series.len() {
         let (a, b) = (series[i - 1] - level, series[i] - level);
@@ -40,9 +41,8 @@ pub fn terminators(s: &Scene) -> Vec<(f64, f64)> {
 /// Where the vehicle begins to be turned or stopped, 1, and where that ends, -1.
 pub fn manoeuvres(s: &Scene) -> Vec<(f64, f64)> {
     let acceleration: Vec<f64> = s.wdot_rad_s2.iter().map(|w| w.norm()).collect();
-    let mut sorted = acceleration.clone();
-    sorted.sort_by(f64::total_cmp);
-    crossings(&s.grid_s, &acceleration, MANOEUVRE * sorted[sorted.len() / 2] + ROUNDING_RAD_S2)
+    let usual = median(&mut acceleration.clone()).unwrap_or(0.0);
+    crossings(&s.grid_s, &acceleration, MANOEUVRE * usual + ROUNDING_RAD_S2)
 }
 
 /// All that recurs in a record.
@@ -67,10 +67,7 @@ pub fn recurring(s: &Scene) -> Vec<Recurring> {
     let last = ends.iter().enumerate().filter(|(i, t)| ends.get(i + 1).is_none_or(|next| apart(**t, *next)));
     add("start of a change of attitude".into(), first.collect());
     add("end of a change of attitude".into(), last.map(|(_, t)| *t).collect());
-    let mut kinds: Vec<&str> = s.case.events.iter().map(|e| e.kind.as_str()).collect();
-    kinds.sort_unstable();
-    kinds.dedup();
-    for kind in kinds {
+    for kind in s.case.kinds() {
         let spans = s.case.spans(kind);
         add(format!("start of {kind}"), spans.iter().map(|x| x[0]).collect());
         // Ends that follow their starts by the same time are the same instants.

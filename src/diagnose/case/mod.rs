@@ -178,6 +178,14 @@ impl Expectation {
         }
     }
 
+    /// Kinds of entries in the log, in order.
+    pub fn kinds(&self) -> Vec<&str> {
+        let mut kinds: Vec<&str> = self.events.iter().map(|e| e.kind.as_str()).collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        kinds
+    }
+
     /// Events of one kind as spans `[start_s, end_s]`.
     pub fn spans(&self, kind: &str) -> Vec<[f64; 2]> {
         self.events.iter().filter(|e| e.kind == kind).map(|e| [e.clock_s, e.clock_s + e.duration_s]).collect()

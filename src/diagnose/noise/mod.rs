@@ -27,7 +27,7 @@ pub use flicker::where_it_may_be_flicker;
 pub use levels::{Contradicted, settled};
 pub use loudness::Loudness;
 pub use marginal::{SlowPart, slow_part_marginalised};
-pub use order::{PERIODS_S, with_resonances};
+pub use order::{FORGOTTEN_S, PERIODS_S, with_resonances};
 pub use resonance::Resonance;
 
 use likelihood::{Series, products};

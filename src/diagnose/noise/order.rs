@@ -10,6 +10,8 @@ use crate::math::shared_work;
 pub const PERIODS_S: [f64; 2] = [100.0, 2400.0];
 /// Times in which its phase is forgotten, in periods. What keeps its phase for longer is a signal: it could be said when it pushes.
 const FORGOTTEN: [f64; 2] = [0.25, 4.0];
+/// Longest time in which it is forgotten, s.
+pub const FORGOTTEN_S: f64 = FORGOTTEN[1] * PERIODS_S[1];
 /// Where a fit of it begins: its share of the white noise, and times in periods.
 const SHARE: f64 = 0.3;
 const BEGINS: [f64; 3] = [0.5, 1.0, 2.5];

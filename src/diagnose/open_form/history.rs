@@ -64,10 +64,7 @@ fn begins_once(s: &Scene, instants: &[(f64, f64)], tau_s: f64) -> bool {
 
 pub(super) fn events(c: &mut Collector) {
     let s = c.scene;
-    let mut kinds: Vec<&str> = s.case.events.iter().map(|e| e.kind.as_str()).collect();
-    kinds.sort_unstable();
-    kinds.dedup();
-    for kind in kinds {
+    for kind in s.case.kinds() {
         let spans = s.case.spans(kind);
         let starts: Vec<(f64, f64)> = spans.iter().map(|x| (x[0], 1.0)).collect();
         let ends: Vec<(f64, f64)> = spans.iter().map(|x| (x[1], 1.0)).collect();
@@ -241,10 +238,10 @@ fn creeps(s: &Scene) -> Vec<(String, Vec<f64>)> {
     let [start, end] = s.span_s();
     let mut members = Vec::new();
     for i in 0..ONSETS {
-        let onset = start + (end - start) * i as f64 / ONSETS as f64;
-        for tau in [100.0, 1000.0, 10_000.0] {
-            let creep = s.clock_s().iter().map(|t| ((t - onset).max(0.0) / tau).ln_1p()).collect();
-            members.push((format!("log(1 + max(t - {onset:.0} s, 0)/{tau:.0} s)"), creep));
+        let onset_s = start + (end - start) * i as f64 / ONSETS as f64;
+        for tau_s in [100.0, 1000.0, 10_000.0] {
+            let creep = s.clock_s().iter().map(|t| ((t - onset_s).max(0.0) / tau_s).ln_1p()).collect();
+            members.push((format!("log(1 + max(t - {onset_s:.0} s, 0)/{tau_s:.0} s)"), creep));
         }
     }
     members

@@ -104,12 +104,12 @@ fn changing_lines(c: &mut Collector, u: &[f64]) {
     let [start, end] = s.span_s();
     let line = [s.measure_scalar(|g| u[g].sin()), s.measure_scalar(|g| u[g].cos())];
     let members = (2..=ONSETS - 2).map(|i| {
-        let onset = start + (end - start) * i as f64 / ONSETS as f64;
+        let onset_s = start + (end - start) * i as f64 / ONSETS as f64;
         let from = |series: &Vec<f64>| {
             let windows = series.iter().zip(s.clock_s());
-            windows.map(|(x, t)| if *t >= onset { *x } else { 0.0 }).collect()
+            windows.map(|(x, t)| if *t >= onset_s { *x } else { 0.0 }).collect()
         };
-        (format!("sin u, cos u from {onset:.0} s on"), line.iter().map(from).collect())
+        (format!("sin u, cos u from {onset_s:.0} s on"), line.iter().map(from).collect())
     });
     c.several_family("argument_of_latitude", "from an instant of no log on", members);
 }

@@ -14,13 +14,11 @@ use super::parts::{APART, Beside, LENGTH, Oscillation, Parts};
 use crate::diagnose::answer::Interval;
 use crate::diagnose::case::WINDOW_STRIDE_S;
 use crate::diagnose::instants::Recurring;
+use crate::diagnose::noise::FORGOTTEN_S;
 use crate::math::shared_work;
 
 /// Power beside white noise, all axes together, from which on a line is weighed: one line of white noise in seventy has as much.
 const WORTH_WEIGHING: f64 = 8.0;
-
-/// Longest time in which noise forgets its phase, s: four times the longest period of a resonance.
-const FORGOTTEN_S: f64 = 9600.0;
 
 /// What rings, in what time it dies away, s, and after what.
 type Ringing<'a> = (Oscillation, f64, &'a Recurring);
