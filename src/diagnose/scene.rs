@@ -200,19 +200,32 @@ impl<'a> Scene<'a> {
 
     /// The scene of a case in surroundings that are known already: those of its expectation.
     pub fn within(case: &'a Case, surroundings: Arc<Surroundings>) -> Self {
+        let mut scene = Self::as_loud(case, surroundings, Default::default());
+        let [dev_ng, residuals_ng] =
+            [&case.recording.dev_ng, &scene.residual_ng].map(|axes| axes.each_ref().map(|x| &x[..]));
+        (scene.loudness, scene.contradicted) = noise::settled(dev_ng, &asleep(case), residuals_ng, &scene.schedule);
+        scene
+    }
+
+    /// The scene of a case that begins as this one and goes on with windows not taken yet: those are as loud as these are while the
+    /// crew is awake.
+    pub fn gone_on<'b>(&self, case: &'b Case, surroundings: Arc<Surroundings>) -> Scene<'b> {
+        let asleep = asleep(self.case);
+        let loudness =
+            self.loudness.each_ref().map(|known| known.gone_on(known.awake(&asleep), case.recording.clock_s.len()));
+        Scene { contradicted: self.contradicted, ..Scene::as_loud(case, surroundings, loudness) }
+    }
+
+    fn as_loud(case: &'a Case, surroundings: Arc<Surroundings>, loudness: [Loudness; 3]) -> Self {
         let windows = &case.recording.clock_s;
         let to_windows = Measurement::new(&case.simulation.clock_s, windows);
         let simulated_ng = case.simulation.a_ng.each_ref().map(|series| to_windows.apply(series));
         let residual_ng: Axes =
             std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
-        let sleeps: Vec<bool> = coverage(windows, &case.spans("crew_sleep")).iter().map(|c| *c > 0.5).collect();
-        let schedule = Schedule::new(windows).with_shared(case.recording.bias_errors_ng.clone());
-        let [dev_ng, residuals_ng] = [&case.recording.dev_ng, &residual_ng].map(|axes| axes.each_ref().map(|x| &x[..]));
-        let (loudness, contradicted) = noise::settled(dev_ng, &sleeps, residuals_ng, &schedule);
         Self {
-            schedule,
+            schedule: Schedule::new(windows).with_shared(case.recording.bias_errors_ng.clone()),
             loudness,
-            contradicted,
+            contradicted: [None; 3],
             residual_ng,
             simulated_ng,
             measurement: Measurement::new(&surroundings.grid_s, windows),
@@ -282,6 +295,11 @@ impl<'a> Scene<'a> {
     }
 }
 
+/// Whether the crew sleeps, by its log, for most of each window.
+fn asleep(case: &Case) -> Vec<bool> {
+    coverage(&case.recording.clock_s, &case.spans("crew_sleep")).iter().map(|share| *share > 0.5).collect()
+}
+
 fn vehicle(header: &Header) -> physics::vehicle::Vehicle {
     let v = &header.vehicle;
     physics::vehicle::Vehicle {
@@ -343,4 +361,38 @@ fn interpolate(grid: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {
             values[j - 1] + share * (values[j] - values[j - 1])
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::catalogue::made;
+
+    /// Windows to come have no values yet: that they are not noisy says nothing.
+    #[test]
+    fn windows_to_come_are_as_loud_as_those_awake_and_those_known_stay() {
+        let case = made::case();
+        let asleep = asleep(&case);
+        let mut scene = Scene::new(&case).unwrap();
+        scene.loudness = [1.0, 0.7, 0.5].map(|quiet| Loudness::of_crew([1.0, quiet], &asleep));
+        scene.loudness[0].burst[7] = 30.0;
+        let known = case.recording.clock_s.len();
+        let mut longer = case.clone();
+        let last_s = longer.recording.clock_s[known - 1];
+        longer.recording.clock_s.extend((1..=100).map(|i| last_s + 25.0 * f64::from(i)));
+        for k in 0..3 {
+            longer.recording.a_ng[k].resize(known + 100, 0.0);
+            longer.recording.dev_ng[k].resize(known + 100, 0.0);
+        }
+        let ahead = scene.gone_on(&longer, scene.surroundings.clone());
+        let i = asleep.iter().position(|sleeps| !sleeps).unwrap();
+        for (was, is) in scene.loudness.iter().zip(&ahead.loudness) {
+            assert_eq!(is.activity[..known], was.activity);
+            assert_eq!(is.burst[..known], was.burst);
+            for level in &is.activity[known..] {
+                assert!((level / was.activity[i] - 1.0).abs() < 1e-9, "{level} for {}", was.activity[i]);
+            }
+            assert_eq!(is.burst[known..], [1.0; 100]);
+        }
+    }
 }

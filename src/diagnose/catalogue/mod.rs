@@ -17,7 +17,7 @@ pub mod diurnal_bulge;
 pub mod evaporator_venting;
 pub mod gravity_gradient;
 #[cfg(test)]
-mod made;
+pub(super) mod made;
 pub mod magnetic_sensitivity;
 pub mod mass_shift;
 pub mod misalignment;

@@ -1,7 +1,9 @@
 //! How loud the windows of an axis are.
 
+use crate::math::rms::rms;
+
 /// How loud each window of an axis is, beside the noise that all of them have.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Loudness {
     /// Level of the white and the short noise that the crew's activity gives; mean square 1.
     pub activity: Vec<f64>,
@@ -21,6 +23,20 @@ impl Loudness {
         let raw: Vec<f64> = sleeps.iter().map(|sleeps| if *sleeps { asleep } else { awake }).collect();
         let rms = (raw.iter().map(|x| x * x).sum::<f64>() / raw.len().max(1) as f64).sqrt();
         Self::even(raw.iter().map(|x| x / rms).collect())
+    }
+
+    /// Level while the crew is awake, in the mean of squares; that of all windows where it never is.
+    pub fn awake(&self, sleeps: &[bool]) -> f64 {
+        let awake: Vec<f64> = self.activity.iter().zip(sleeps).filter(|(_, s)| !**s).map(|(level, _)| *level).collect();
+        if awake.is_empty() { 1.0 } else { rms(&awake) }
+    }
+
+    /// The same with more windows behind it, up to so many, all of one level and without bursts.
+    pub fn gone_on(&self, level: f64, windows: usize) -> Self {
+        let mut longer = self.clone();
+        longer.activity.resize(windows, level);
+        longer.burst.resize(windows, 1.0);
+        longer
     }
 
     /// Some of the windows.

@@ -287,7 +287,7 @@ fn add(sum: &mut Axes, part: &Axes, factor: f64) {
 fn fly(scene: &Scene, noise: &[AxisNoise; 3], sets: &[Fitted], now: &Contest, candidate: Candidate) -> Option<Outcome> {
     let Candidate { action, hours } = candidate;
     let (case, surroundings) = to_come(scene, action, hours)?;
-    let ahead = Scene::within(&case, Arc::new(surroundings));
+    let ahead = scene.gone_on(&case, Arc::new(surroundings));
     let first = scene.schedule.len();
     let turned = matches!(action, Action::Turn).then_some(first);
     let then = Contest::new(&ahead, noise, sets, turned)?;
