@@ -1,7 +1,7 @@
 //! The observation said to separate two sets does: flown by the mission simulator, not by the analyser's own.
 
 use nalgebra::{DMatrix, DVector};
-use oare_ground::diagnose::answer::Verdict;
+use oare_ground::diagnose::answer::{SeparatingObservation, Verdict};
 use oare_ground::diagnose::case::{Case, Header, Texts};
 use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
 use oare_ground::physics::Vec3;
@@ -23,31 +23,57 @@ const NOISE_NG: f64 = 40.0;
 /// The attitude held all along: nose to the Earth.
 const HELD_DEG: [f64; 3] = [0.0, -90.0, 0.0];
 
+/// By how much the drag is wrong, and the scale factor of the axis along the track.
+const FRACTION: f64 = 0.2;
+/// The axis along the track, nose to the Earth.
+const ALONG_TRACK: usize = 2;
+
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Truth {
     MassShift,
     BiasStep,
+    Drag,
+    ScaleFactor,
+}
+
+impl Truth {
+    fn id(self) -> &'static str {
+        match self {
+            Truth::MassShift => "mass_shift",
+            Truth::BiasStep => "bias_step",
+            Truth::Drag => "aerodynamic_drag",
+            Truth::ScaleFactor => "scale_factor",
+        }
+    }
 }
 
 /// What is done after the hours known.
 #[derive(Clone, Copy)]
 struct Plan {
     hours: f64,
-    turn_to_deg: Option<[f64; 3]>,
+    turn_to: Option<(Hold, [f64; 3])>,
 }
 
-fn mission(plan: Plan, shift_m: Vec3) -> Mission {
+impl Plan {
+    fn wait(hours: f64) -> Self {
+        Self { hours, turn_to: None }
+    }
+}
+
+/// A mission whose sensor is so far from where it is thought to be, and whose drag is so many times what is expected.
+fn mission(plan: Plan, shift_m: Vec3, drag: f64) -> Mission {
     let mut config = MissionConfig::sts65(5, KNOWN_H + plan.hours);
     let start_s = f64::from(config.start_clock_s);
-    let hold = |from_clock_s: f64, deg: [f64; 3]| AttitudeHold {
+    let held = |from_clock_s: f64, hold: Hold, deg: [f64; 3]| AttitudeHold {
         from_clock_s,
-        hold: Hold::LocalVertical,
+        hold,
         euler_rad: Vec3::from(deg.map(f64::to_radians)),
     };
-    config.attitudes = vec![hold(start_s, HELD_DEG)];
-    config.attitudes.extend(plan.turn_to_deg.map(|deg| hold(start_s + KNOWN_H * 3600.0, deg)));
+    config.attitudes = vec![held(start_s, Hold::LocalVertical, HELD_DEG)];
+    config.attitudes.extend(plan.turn_to.map(|(hold, deg)| held(start_s + KNOWN_H * 3600.0, hold, deg)));
     config.wobble_rad = 3e-4;
     config.vehicle.sensor_offset_m += shift_m;
+    config.vehicle.drag_coefficient *= drag;
     Mission::new(config).unwrap()
 }
 
@@ -58,30 +84,33 @@ fn windows(mission: &Mission, clock_s: &[f64]) -> Vec<Vec3> {
     clock_s.iter().map(mean).collect()
 }
 
-/// What a plan brings: windows every 25 s, what the simulation expects there, what the shift adds, and the noise.
+/// What a plan brings: windows every 25 s, what the simulation expects there, what the shift and the drag add, and the noise.
 struct Flown {
     clock_s: Vec<f64>,
     expected: Vec<Vec3>,
     shift: Vec<Vec3>,
+    drag: Vec<Vec3>,
     noise: Vec<Vec3>,
     mission: Mission,
 }
 
 impl Flown {
     fn new(plan: Plan) -> Self {
-        let mission = mission(plan, Vec3::zeros());
+        let mission = mission(plan, Vec3::zeros(), 1.0);
         let (start, end) = (f64::from(mission.config().start_clock_s), f64::from(mission.config().end_clock_s()));
         let clock_s: Vec<f64> =
             (0..).map(|i| start + 100.0 + 25.0 * f64::from(i)).take_while(|t| *t < end - 100.0).collect();
         let expected = windows(&mission, &clock_s);
-        let moved = windows(&self::mission(plan, Vec3::from(SHIFT_M)), &clock_s);
+        let moved = windows(&self::mission(plan, Vec3::from(SHIFT_M), 1.0), &clock_s);
+        let braked = windows(&self::mission(plan, Vec3::zeros(), 1.0 + FRACTION), &clock_s);
         let after = |t: f64, a: Vec3| if t >= ONSET_S { a } else { Vec3::zeros() };
         let shift = (0..clock_s.len()).map(|i| after(clock_s[i], moved[i] - expected[i])).collect();
+        let drag = braked.iter().zip(&expected).map(|(a, b)| a - b).collect();
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let mut halves = || Vec3::from_fn(|_, _| NOISE_NG * Distribution::<f64>::sample(&StandardNormal, &mut rng));
         let halves: Vec<Vec3> = (0..=clock_s.len()).map(|_| halves()).collect();
         let noise = halves.windows(2).map(|two| (two[0] + two[1]) / 2.0_f64.sqrt()).collect();
-        Self { clock_s, expected, shift, noise, mission }
+        Self { clock_s, expected, shift, drag, noise, mission }
     }
 
     /// The step that looks like the shift in the attitude held.
@@ -102,6 +131,8 @@ impl Flown {
         match truth {
             Truth::MassShift => self.shift[i],
             Truth::BiasStep => self.step(i),
+            Truth::Drag => self.drag[i],
+            Truth::ScaleFactor => Vec3::ith(ALONG_TRACK, FRACTION * self.expected[i][ALONG_TRACK]),
         }
     }
 
@@ -132,8 +163,8 @@ impl Flown {
             (0..3)
                 .map(|k| {
                     let seen = |effect: Truth, i: usize| match effect {
-                        Truth::MassShift => sign(i) * self.shift[i][k],
                         Truth::BiasStep => self.step(i)[k],
+                        moves => sign(i) * self.effect(moves, i)[k],
                     };
                     let y =
                         DVector::from_iterator(rows.len(), rows.iter().map(|i| seen(truth, *i) + self.noise[*i][k]));
@@ -147,6 +178,7 @@ impl Flown {
     }
 }
 
+/// Numbers that come after these words.
 fn numbers_after(text: &str, words: &[&str]) -> Option<Vec<f64>> {
     let number = |word: &&str| {
         let rest = &text[text.find(word)? + word.len()..];
@@ -155,50 +187,65 @@ fn numbers_after(text: &str, words: &[&str]) -> Option<Vec<f64>> {
     words.iter().map(number).collect()
 }
 
-#[test]
-fn a_mass_shift_and_a_bias_step_are_decided_by_the_observation_told_and_not_by_waiting() {
-    let known = Flown::new(Plan { hours: 0.0, turn_to_deg: None });
-    let asked = known.diagnosed(Truth::MassShift);
+/// What is told to part two truths, of a record of one of them that has both among what it cannot tell apart.
+fn asked(known: &Flown, truth: Truth, other: Truth) -> SeparatingObservation {
+    let asked = known.diagnosed(truth);
     assert_eq!(asked.verdict, Verdict::Ambiguous, "{asked:#?}");
-    for id in ["mass_shift", "bias_step"] {
+    for id in [truth.id(), other.id()] {
         assert!(asked.cannot_tell_apart.iter().any(|set| set == &[id]), "{id}: {:?}", asked.cannot_tell_apart);
     }
     let told = asked.separating_observation.unwrap();
-    let gain = told.gain.unwrap();
-    eprintln!("{}: {} ({gain})", told.kind, told.text);
-    assert!(gain >= 3.0, "{told:?}");
-    let hours = numbers_after(&told.text, &["degrees) for", "as it is, for"])
-        .map_or_else(|| numbers_after(&told.text, &[" for"]).unwrap()[0], |hours| hours[0]);
+    eprintln!("{}: {}", told.kind, told.text);
+    assert!(told.gain.unwrap() >= 3.0, "{told:?}");
+    told
+}
+
+/// How long it is to last, h.
+fn hours(told: &SeparatingObservation) -> f64 {
+    let words = ["degrees) for", "as it is, for", "to the stars for"];
+    words.iter().find_map(|word| numbers_after(&told.text, &[word])).unwrap()[0]
+}
+
+/// The attitude told, flown.
+fn turned(told: &SeparatingObservation) -> Flown {
+    let turn_to = match numbers_after(&told.text, &["roll", "pitch", "yaw"]) {
+        Some(deg) => (Hold::LocalVertical, [deg[0], deg[1], deg[2]]),
+        None => (Hold::Inertial, HELD_DEG),
+    };
+    Flown::new(Plan { hours: hours(told) + 0.25, turn_to: Some(turn_to) })
+}
+
+#[test]
+fn a_mass_shift_and_a_bias_step_are_decided_by_the_turn_of_the_table_told_and_not_by_waiting() {
+    let known = Flown::new(Plan::wait(0.0));
+    let told = asked(&known, Truth::MassShift, Truth::BiasStep);
+    assert_eq!(told.kind, "table_flip", "{told:?}");
 
     // As long in the attitude held: nothing is decided.
-    let waiting = Flown::new(Plan { hours: hours + 0.25, turn_to_deg: None });
+    let waiting = Flown::new(Plan::wait(hours(&told) + 0.25));
     for truth in [Truth::MassShift, Truth::BiasStep] {
         assert_eq!(waiting.diagnosed(truth).verdict, Verdict::Ambiguous, "{truth:?} after waiting");
     }
-    match told.kind.as_str() {
-        "table_flip" => {
-            let from_s = known.clock_s[known.clock_s.len() - 1] + 600.0;
-            let (shift, step) = (
-                waiting.shift_against_step(Truth::MassShift, from_s),
-                waiting.shift_against_step(Truth::BiasStep, from_s),
-            );
-            let (no_shift, no_step) = (
-                waiting.shift_against_step(Truth::MassShift, f64::INFINITY),
-                waiting.shift_against_step(Truth::BiasStep, f64::INFINITY),
-            );
-            eprintln!("turned: {shift:.1} {step:.1}; not turned: {no_shift:.1} {no_step:.1}");
-            assert!(shift > 3.0 && step < -3.0, "{shift} {step}");
-            assert!(no_shift.abs() < 3.0 && no_step.abs() < 3.0, "{no_shift} {no_step}");
-        }
-        "attitude" => {
-            let deg = numbers_after(&told.text, &["roll", "pitch", "yaw"]).unwrap();
-            let turned = Flown::new(Plan { hours: hours + 0.25, turn_to_deg: Some([deg[0], deg[1], deg[2]]) });
-            for (truth, id) in [(Truth::MassShift, "mass_shift"), (Truth::BiasStep, "bias_step")] {
-                let decided = turned.diagnosed(truth);
-                let named: Vec<&str> = decided.effects.iter().map(|e| e.id.as_str()).collect();
-                assert_eq!((decided.verdict, named), (Verdict::Explained, vec![id]), "{truth:?}");
-            }
-        }
-        other => panic!("{other} is no observation that can be flown"),
+    let from_s = known.clock_s[known.clock_s.len() - 1] + 600.0;
+    let [shift, step] = [Truth::MassShift, Truth::BiasStep].map(|truth| waiting.shift_against_step(truth, from_s));
+    let [no_shift, no_step] =
+        [Truth::MassShift, Truth::BiasStep].map(|truth| waiting.shift_against_step(truth, f64::INFINITY));
+    eprintln!("turned: {shift:.1} {step:.1}; not turned: {no_shift:.1} {no_step:.1}");
+    assert!(shift > 3.0 && step < -3.0, "{shift} {step}");
+    assert!(no_shift.abs() < 3.0 && no_step.abs() < 3.0, "{no_shift} {no_step}");
+}
+
+#[test]
+fn a_wrong_drag_and_a_scale_factor_are_decided_by_the_attitude_told_and_not_by_waiting() {
+    let known = Flown::new(Plan::wait(0.0));
+    let told = asked(&known, Truth::Drag, Truth::ScaleFactor);
+    assert_eq!(told.kind, "attitude", "{told:?}");
+    let (waiting, turned) = (Flown::new(Plan::wait(hours(&told) + 0.25)), turned(&told));
+    for truth in [Truth::Drag, Truth::ScaleFactor] {
+        assert_eq!(waiting.diagnosed(truth).verdict, Verdict::Ambiguous, "{truth:?} after waiting");
+        let decided = turned.diagnosed(truth);
+        eprintln!("{truth:?}: {:?} {:?}", decided.verdict, decided.effects);
+        let first = decided.effects.first().map(|effect| effect.id.as_str());
+        assert_eq!(first, Some(truth.id()), "{decided:#?}");
     }
 }

@@ -13,6 +13,7 @@ pub use header::{Files, Header, Vehicle};
 pub use spikes::SPIKE;
 
 use super::error::CaseError;
+use crate::math::shared_work;
 use crate::pipeline::calibration::AnomalyKind;
 
 /// Windows a recording must have in common with its simulation, fewer say nothing about the noise.
@@ -161,12 +162,15 @@ impl Expectation {
     /// What is wrong with each of the files.
     pub fn from_texts(header: Header, texts: &Texts) -> Result<Self, Vec<CaseError>> {
         let files = &header.files;
-        let simulation = read::given(&files.simulation, &texts.simulation)
-            .and_then(|text| read::simulation(&files.simulation, text))
-            .and_then(|simulation| check::simulation(&files.simulation, &simulation).map(|()| simulation));
-        let ancillary = read::given(&files.ancillary, &texts.ancillary)
-            .and_then(|text| read::ancillary(&files.ancillary, text))
-            .and_then(|ancillary| check::ancillary(&files.ancillary, &ancillary).map(|()| ancillary));
+        let simulation = || {
+            let simulation = read::simulation(&files.simulation, read::given(&files.simulation, &texts.simulation)?)?;
+            check::simulation(&files.simulation, &simulation).map(|()| simulation)
+        };
+        let ancillary = || {
+            let ancillary = read::ancillary(&files.ancillary, read::given(&files.ancillary, &texts.ancillary)?)?;
+            check::ancillary(&files.ancillary, &ancillary).map(|()| ancillary)
+        };
+        let (simulation, ancillary) = shared_work::both(simulation, ancillary);
         let events = read::log(&files.events, &texts.events);
         match (simulation, ancillary, events) {
             (Ok(simulation), Ok(ancillary), Ok(events)) => {
