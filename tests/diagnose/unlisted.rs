@@ -54,3 +54,25 @@ fn saturation_is_no_scale_factor() {
     };
     is_unlisted(&with(lost, [0.0, 1.0, 0.0]), "(my beyond ");
 }
+
+/// Hours long and of a steady period: slow noise of any size would not keep its phase.
+#[test]
+fn a_slow_swing_is_no_slow_noise() {
+    let swing = |case: &Case| {
+        let clock_s = &case.recording.clock_s;
+        clock_s.iter().map(|t| (std::f64::consts::TAU * t / 19_550.0).sin()).collect()
+    };
+    is_unlisted(&with(swing, [0.6, -0.2, 0.3]), "cycles per orbit");
+}
+
+/// A push that dies away after every falling asleep, and the opposite one after every waking.
+#[test]
+fn what_dies_away_after_falling_asleep_and_waking_is_no_crew_activity_and_no_leak() {
+    let both = |case: &Case| {
+        let sleeps = case.spans("crew_sleep");
+        let since = |t: f64, from: f64| if t > from { (-(t - from) / 4000.0).exp() } else { 0.0 };
+        let pushes = |t: &f64| sleeps.iter().map(|[a, b]| since(*t, *a) - since(*t, *b)).sum();
+        case.recording.clock_s.iter().map(pushes).collect()
+    };
+    is_unlisted(&with(both, [0.7, 0.3, -0.3]), "start or end of crew_sleep, signed");
+}

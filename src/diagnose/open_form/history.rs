@@ -5,6 +5,7 @@ use crate::diagnose::case::HALF_WINDOW_S;
 use crate::diagnose::instants::{manoeuvres, terminators};
 use crate::diagnose::measure::{coverage, decay};
 use crate::diagnose::scene::Scene;
+use crate::math::robust::median;
 use crate::physics::Vec3;
 
 /// Decays after instants, each forgetting the one before: exp(-(t - last)/tau).
@@ -89,6 +90,7 @@ pub(super) fn events(c: &mut Collector) {
                 coverage(s.clock_s(), &late),
             );
         }
+        c.family("time_since_event", "after logged events", after_both_ends(s, kind, &spans));
         echoes(c, kind, &ends);
         for (what, list) in [("start", &starts), ("end", &ends)] {
             c.family("time_since_event", "between logged events", ramps(s, kind, what, list));
@@ -149,6 +151,25 @@ pub(super) fn attitude(c: &mut Collector) {
         }
         c.several_family(covariate, "after changes of attitude", members);
     }
+}
+
+/// What dies away after the start and after the end of every entry alike, or in the opposite sense: of entries that last longer than it
+/// takes, since of others the one is not over when the other begins.
+fn after_both_ends(s: &Scene, kind: &str, spans: &[[f64; 2]]) -> Vec<(String, Vec<f64>)> {
+    let mut lengths_s: Vec<f64> = spans.iter().map(|[start, end]| end - start).collect();
+    let usual_s = median(&mut lengths_s).unwrap_or(0.0);
+    let mut members = Vec::new();
+    for tau_s in [200.0, 600.0, 2000.0, 6000.0].into_iter().filter(|tau_s| *tau_s < usual_s) {
+        for (sense, words) in [(1.0, ""), (-1.0, ", signed")] {
+            let mut changes: Vec<(f64, f64)> = spans.iter().flat_map(|[a, b]| [(*a, 1.0), (*b, sense)]).collect();
+            changes.sort_by(|a, b| a.0.total_cmp(&b.0));
+            if !begins_once(s, &changes, tau_s) {
+                let pushes = since(s, &changes, tau_s);
+                members.push((format!("exp(-(time since start or end of {kind}{words})/{tau_s:.0} s)"), pushes));
+            }
+        }
+    }
+    members
 }
 
 /// A push some time after every entry of the log, that dies away, each beside those before: delays closer than the time it lasts, so
@@ -221,15 +242,27 @@ pub(super) fn clock(c: &mut Collector) {
             &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()],
         );
     }
-    for cycles in (1..=40).map(|i| 0.05 * f64::from(i)).chain([2.5, 8.0, 12.0, 16.0]) {
-        let rate = std::f64::consts::TAU * cycles / s.period_s;
-        c.several(
-            format!("sin, cos at {cycles:.2} cycles per orbit"),
-            "per_orbit_line",
-            "a line of the spectrum",
-            &[&|g| (rate * s.grid_s[g]).sin(), &|g| (rate * s.grid_s[g]).cos()],
-        );
+    for near in lines((end - start) / s.period_s) {
+        let sine_and_cosine = |cycles: &f64| {
+            let rate = std::f64::consts::TAU * cycles / s.period_s;
+            let parts = [f64::sin, f64::cos].map(|of| s.measure_scalar(|g| of(rate * s.grid_s[g])));
+            (format!("sin, cos at {cycles:.3} cycles per orbit"), parts.to_vec())
+        };
+        c.several_family("per_orbit_line", "a line of the spectrum", near.iter().map(sine_and_cosine));
     }
+}
+
+/// Lines of the spectrum that are tried, in cycles per orbit, in a record of so many revolutions, those weighed together that are near to
+/// each other: the slow ones, which slow noise would hide from a later look at what remains, every half cycle over the record from one
+/// on, so that none falls between two.
+fn lines(revolutions: f64) -> Vec<Vec<f64>> {
+    const SLOW: usize = 64;
+    const STEP: f64 = 0.05;
+    let slow: Vec<f64> = (2..=SLOW).map(|i| 0.5 * i as f64 / revolutions).take_while(|cycles| *cycles < 1.0).collect();
+    let last = slow.last().copied().unwrap_or(0.0);
+    let quick = (1..=40).map(|i| STEP * f64::from(i)).filter(|cycles| *cycles > last + 0.5 * STEP);
+    let quick = quick.chain([2.5, 8.0, 12.0, 16.0]).map(|cycles| vec![cycles]);
+    slow.chunks(2).map(<[f64]>::to_vec).chain(quick).collect()
 }
 
 /// What creeps with the logarithm of time, as materials do under a load, from an instant of no log on.
@@ -250,6 +283,23 @@ fn creeps(s: &Scene) -> Vec<(String, Vec<f64>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_slow_line_falls_between_two_that_are_tried_whatever_the_length_of_the_record() {
+        for revolutions in [4.0, 16.0, 24.0, 31.8] {
+            let tried = lines(revolutions).concat();
+            assert!(tried.windows(2).all(|w| w[1] > w[0]), "{tried:?}");
+            // In cycles over the record: a quarter away, a line keeps nine tenths of its amplitude.
+            let mut cycles = 1.0;
+            while cycles < revolutions {
+                let away = tried.iter().map(|line| (line * revolutions - cycles).abs()).fold(f64::INFINITY, f64::min);
+                assert!(away <= 0.26, "{cycles} cycles in {revolutions} revolutions: {away}");
+                cycles += 0.01;
+            }
+        }
+        // Weeks are searched as coarsely as the quick lines.
+        assert!(lines(300.0).concat().len() < 120);
+    }
 
     #[test]
     fn a_follower_is_at_63_percent_of_a_step_after_its_time() {
