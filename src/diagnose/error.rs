@@ -77,7 +77,7 @@ pub enum CaseError {
     },
     /// Values cannot be in the unit the column promises.
     #[error(
-        "{file}: `{column}` has a typical size of {found:.3e}, and {unit} between {low:.0e} and {high:.0e} is expected: is the unit right?"
+        "{file}: `{column}` has a typical size of {found:.3e}, and {unit} between {low:e} and {high:e} is expected: is the unit right?"
     )]
     Unit {
         /// File.
@@ -232,6 +232,14 @@ pub enum CaseError {
 }
 
 impl CaseError {
+    /// The line it is about, where it is one.
+    pub fn line_mut(&mut self) -> Option<&mut usize> {
+        match self {
+            Self::NotANumber { line, .. } | Self::TimeOrder { line, .. } | Self::Beyond { line, .. } => Some(line),
+            _ => None,
+        }
+    }
+
     /// The file it is about, where it is one.
     pub fn file(&self) -> Option<&String> {
         match self {

@@ -1,5 +1,8 @@
 //! The geomagnetic field: IGRF, degree 13, by the `igrf` crate.
 //!
+//! After the last year of its table the field of that year's end stands: it changes by some parts in a thousand a year (IAGA's secular
+//! variation of IGRF-13 for 2020 to 2025 is below 0.2 uT a year of 20 to 65 uT).
+//!
 //! The crate knows whole days only (secular change is below 0.4 nT a day) and whole metres of height, and answers NaN
 //! within 0.001 deg of a pole: there the latitude is moved by 0.002 deg (220 m, less than 1 nT).
 
@@ -10,11 +13,14 @@ use super::{PhysicsError, Vec3};
 const TESLA_PER_NT: f64 = 1e-9;
 /// Highest latitude asked of the crate, degrees.
 const LATITUDE_DEG_MAX: f64 = 89.998;
+/// The day up to which the crate's table is used, its last but one, and the last year in which its field is near enough.
+const TABLE_END: (i32, u16) = (2024, 365);
+const YEAR_MAX: i32 = 2039;
 
 /// Magnetic flux density at an inertial position, inertial axes (true equator of date), tesla.
 ///
 /// # Errors
-/// [`PhysicsError::FieldDate`] outside 1900 to 2025, [`PhysicsError::Position`] for a position that is no place.
+/// [`PhysicsError::FieldDate`] outside 1900 to 2039, [`PhysicsError::Position`] for a position that is no place.
 pub fn geomagnetic_field_t(unix_s: f64, r_inertial_m: &Vec3) -> Result<Vec3, PhysicsError> {
     let mut place = place(unix_s, r_inertial_m)?;
     let latitude_deg = place.latitude_rad.to_degrees().clamp(-LATITUDE_DEG_MAX, LATITUDE_DEG_MAX);
@@ -44,7 +50,9 @@ fn date(unix_s: f64) -> Option<time::Date> {
     if (number - J2000_JD).abs() > 100_000.0 {
         return None;
     }
-    time::Date::from_julian_day(number as i32).ok()
+    let date = time::Date::from_julian_day(number as i32).ok()?;
+    let end = time::Date::from_ordinal_date(TABLE_END.0, TABLE_END.1).ok()?;
+    (date.year() <= YEAR_MAX).then(|| date.min(end))
 }
 
 #[cfg(test)]
@@ -107,6 +115,10 @@ mod tests {
         assert!(pole.iter().all(|b| b.is_finite()) && pole.norm() > 4e-5, "{pole}");
         let r = Vec3::new(6.7e6, 0.0, 0.0);
         assert!(matches!(geomagnetic_field_t(4e9, &r), Err(PhysicsError::FieldDate { .. })));
+        // At the pole, so that the Earth's turn makes no difference: 2024-12-30, 2026-11-26 and 2038-01-01.
+        let [before, now, later] = [1_735_516_800.0, 1_795_651_200.0, 2_145_916_800.0]
+            .map(|unix_s| geomagnetic_field_t(unix_s, &Vec3::new(0.0, 0.0, 6.7e6)).unwrap().norm());
+        assert!((now / before - 1.0).abs() < 1e-3 && (later / now - 1.0).abs() < 1e-3, "{before} {now} {later}");
         assert!(matches!(
             geomagnetic_field_t(f64::NAN, &r),
             Err(PhysicsError::FieldDate { .. } | PhysicsError::Position { .. })

@@ -47,7 +47,7 @@ pub const EARTH_RATE_RAD_S: f64 = 7.292_115_9e-5;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PhysicsError {
     /// The geomagnetic field is tabulated for other years.
-    #[error("the geomagnetic field is tabulated for 1900 to 2025, not for unix time {unix_s} s")]
+    #[error("the geomagnetic field is known for the years 1900 to 2039, not for unix time {unix_s} s")]
     FieldDate {
         /// The time asked for, seconds since 1970 UTC.
         unix_s: f64,

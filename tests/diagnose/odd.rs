@@ -41,6 +41,15 @@ fn read(files: &Files) -> Result<Case, String> {
     engine::read(&Material::Files(files))
 }
 
+/// The same with another value of a key of `case.toml`.
+fn with_key(key: &str, value: &str) -> Files {
+    with_lines("case.toml", |lines| {
+        for line in lines.iter_mut().filter(|line| line.starts_with(&format!("{key} ="))) {
+            *line = format!("{key} = {value}");
+        }
+    })
+}
+
 /// The same with a column of the ancillary data, and the two after it, put through a function.
 fn turned(first: &str, how: impl Fn(f64) -> f64) -> Files {
     with_lines("ancillary.csv", |lines| {
@@ -120,13 +129,68 @@ fn what_nothing_can_be_is_refused_with_its_place() {
             }),
             "case.toml: `case.end_s` (10 s) must be after `case.start_s` (",
         ),
+        (with_key("mass_kg", "104.0"), "ancillary.csv: `drag by density_kg_m3 and case.toml's mass_kg, area_m2"),
+        (with_key("events", "5"), "case.toml: `ancillary.events` must be a text, found 5"),
+        (with_key("includes", "[1]"), "case.toml: `simulation.includes` must be a list of texts, found [1]"),
+        (
+            with_key("epoch_utc", "\"2050-01-01T00:00:00Z\""),
+            "case.toml: `case.epoch_utc` or a position is out of range",
+        ),
+        // Empty lines count.
+        (
+            with_lines("recording.csv", |lines| {
+                lines[40] = lines[40].replacen(',', ",NaN", 1);
+                lines.insert(20, String::new());
+                lines.insert(20, String::new());
+            }),
+            "recording.csv, line 43: `ax_ng` must be a finite number",
+        ),
+        (
+            with_lines("ancillary.csv", |lines| {
+                lines.swap(30, 31);
+                lines.insert(20, String::new());
+            }),
+            "ancillary.csv, line 33: clock_s must increase",
+        ),
         (turned("wx_rad_s", |rate| 57.3 * rate), "ancillary.csv: `wx_rad_s, wy_rad_s, wz_rad_s` is not how qw, qx, qy"),
         (turned("qx", |q| -q), "ancillary.csv: `wx_rad_s, wy_rad_s, wz_rad_s` is not how qw, qx, qy, qz change"),
         (turned("vx_m_s", |v| 0.6 * v), "ancillary.csv: `vx_m_s, vy_m_s, vz_m_s` is not how rx_m, ry_m, rz_m change"),
     ] {
-        let said = read(&files).err().unwrap_or_else(|| panic!("not refused: {sentence}"));
+        let whole = |case: Case| diagnose(&case, &Settings::default()).map_err(|error| error.to_string());
+        let said = read(&files).and_then(whole).err().unwrap_or_else(|| panic!("not refused: {sentence}"));
         assert!(said.contains(sentence), "{said}");
     }
+}
+
+/// A temperature that is what it was is no series: nothing can be said of what follows it, and nothing of what is left out either.
+#[test]
+fn an_effect_of_what_does_not_change_has_no_limit() {
+    for value in ["21.3", "0.1"] {
+        let still = with_cell("ancillary.csv", None, "temperature_c", value);
+        let found = diagnose(&read(&still).unwrap(), &Settings::default()).unwrap();
+        assert!(!found.upper_limits.iter().any(|limit| limit.id == "temperature_bias"), "{:?}", found.upper_limits);
+        assert!(found.upper_limits.iter().any(|limit| limit.id == "bias_drift"), "{:?}", found.upper_limits);
+    }
+}
+
+/// Few windows, in which little changes: what is asked of them has an end.
+#[test]
+fn every_length_of_record_has_an_answer_without_absurd_limits() {
+    for windows in [205, 210, 250, 320] {
+        let short = with_lines("recording.csv", |lines| lines.truncate(windows + 1));
+        let found = diagnose(&read(&short).unwrap(), &Settings::default()).unwrap();
+        for limit in &found.upper_limits {
+            assert!(limit.limit_ng > 0.0 && limit.limit_ng < 1e5, "{windows}: {limit:?}");
+        }
+    }
+}
+
+/// The geomagnetic field of years beyond its table is that of its last.
+#[test]
+fn a_mission_of_today_is_diagnosed() {
+    let (value, sigma, _) = drag(&files());
+    let (now, ..) = drag(&with_key("epoch_utc", "\"2026-11-20T00:00:00Z\""));
+    assert!((now - value).abs() < 2.0 * sigma, "{now} for {value}");
 }
 
 #[test]
@@ -168,6 +232,8 @@ fn a_log_of_another_clock_and_a_claim_that_does_not_hold_are_told() {
         }
     }));
     let of = |word: &str, notes: &[String]| notes.iter().filter(|note| note.contains(word)).count();
+    let (.., of_no_effect) = drag(&with_key("includes", "[\"rotation\", \"gravity_gradiant\"]"));
+    assert_eq!(of("includes gravity_gradiant: that is none", &of_no_effect), 1, "{of_no_effect:?}");
     assert_eq!(of("includes aerodynamic_drag: the recording shows", &notes), 1, "{notes:?}");
     assert_eq!((of("includes rotation", &notes), of("another clock", &notes)), (0, 0), "{notes:?}");
     let (.., notes) = drag(&with_lines("events.csv", |lines| {

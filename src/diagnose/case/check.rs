@@ -1,10 +1,13 @@
 //! Whether the numbers of a case can be in the units they should be in: by the size of the middle one.
 
-use super::{Ancillary, Recording, Simulation, WINDOWS_MIN, motion};
+use super::{Ancillary, Recording, Simulation, Vehicle, WINDOWS_MIN, motion};
 use crate::diagnose::error::CaseError;
+use crate::units::NANO_G_M_S2;
 
 /// Nothing on a vehicle in orbit is accelerated by more, ng.
 const A_MAX_NG: f64 = 1e9;
+/// Drag at which a low orbit would sink by 150 km a day, ng.
+const DRAG_MAX_NG: f64 = 1e5;
 /// Columns of accelerations.
 const ACCELERATION: [&str; 3] = ["ax_ng", "ay_ng", "az_ng"];
 
@@ -49,6 +52,17 @@ pub fn ancillary(file: &str, ancillary: &Ancillary) -> Result<(), CaseError> {
     each(file, "density_kg_m3", &ancillary.density_kg_m3, "kg/m3", [0.0, 1e-6])?;
     each(file, "temperature_c", &ancillary.temperature_c, "C", [-273.15, 2000.0])?;
     motion::agree(file, ancillary)
+}
+
+/// The drag that density, mass and area make: a vehicle that is braked by more does not stay in orbit.
+pub fn drag(file: &str, vehicle: &Vehicle, ancillary: &Ancillary) -> Result<(), CaseError> {
+    let largest_m2 = vehicle.area_m2.iter().fold(0.0_f64, |largest, area| largest.max(*area));
+    let per_density = 0.5 * vehicle.drag_coefficient * largest_m2 / vehicle.mass_kg / NANO_G_M_S2;
+    let rows = ancillary.density_kg_m3.iter().zip(&ancillary.v_m_s);
+    let drag_ng: Vec<f64> =
+        rows.map(|(density, v)| per_density * density * v.iter().map(|c| c * c).sum::<f64>()).collect();
+    let column = "drag by density_kg_m3 and case.toml's mass_kg, area_m2 and drag_coefficient";
+    typical(file, column, &drag_ng, "ng", 0.0, DRAG_MAX_NG)
 }
 
 /// Every value within what there is.

@@ -110,9 +110,10 @@ impl Header {
             override_key(&mut table, item)?;
         }
         let kind = string(&table, "recording.kind")?;
-        let vehicle = Vehicle::of(&table, matches!(kind.as_str(), "acceleration_csv" | "recorder_dump"))?;
+        let of_a_vehicle = matches!(kind.as_str(), "acceleration_csv" | "recorder_dump");
+        let vehicle = Vehicle::of(&table, of_a_vehicle)?;
         let epoch = string(&table, "case.epoch_utc")
-            .or_else(|e| if kind == "acceleration_csv" { Err(e) } else { Ok("1970-01-01T00:00:00Z".into()) })?;
+            .or_else(|e| if of_a_vehicle { Err(e) } else { Ok("1970-01-01T00:00:00Z".into()) })?;
         let epoch_utc = epoch.parse().map_err(|_| CaseError::Key {
             key: "case.epoch_utc".into(),
             expected: "a UTC time such as 1994-07-08T12:53:01Z",
@@ -123,19 +124,26 @@ impl Header {
         if end_s <= start_s {
             return Err(CaseError::Span { start_s, end_s });
         }
+        // A calibration counts from lift-off.
+        if kind == "recorder_dump" && lookup(&table, "case.liftoff_clock_s").is_none() {
+            return Err(wrong("case.liftoff_clock_s", "a finite number", None));
+        }
         Ok(Self {
             id: string(&table, "case.id")?,
             epoch_utc,
             liftoff_clock_s: number_or(&table, "case.liftoff_clock_s", 0.0)?,
             span_s: [start_s, end_s],
             vehicle,
-            includes: words(&table, "simulation.includes"),
+            includes: words(&table, "simulation.includes")?,
             kind,
             files: Files {
                 recording: string(&table, "recording.file").unwrap_or_default(),
                 simulation: string(&table, "simulation.file").unwrap_or_default(),
                 ancillary: string(&table, "ancillary.file").unwrap_or_default(),
-                events: string(&table, "ancillary.events").unwrap_or_default(),
+                events: match lookup(&table, "ancillary.events") {
+                    None => String::new(),
+                    Some(_) => string(&table, "ancillary.events")?,
+                },
             },
             table,
         })
@@ -182,11 +190,10 @@ fn triple_or(table: &toml::Table, key: &str, default: [f64; 3]) -> Result<[f64; 
     numbers.and_then(|n| n.try_into().ok()).ok_or_else(|| wrong(key, "three finite numbers", Some(value)))
 }
 
-fn words(table: &toml::Table, key: &str) -> Vec<String> {
-    lookup(table, key)
-        .and_then(|v| v.as_array())
-        .map(|a| a.iter().filter_map(|v| v.as_str().map(str::to_string)).collect())
-        .unwrap_or_default()
+fn words(table: &toml::Table, key: &str) -> Result<Vec<String>, CaseError> {
+    let Some(value) = lookup(table, key) else { return Ok(Vec::new()) };
+    let texts = value.as_array().and_then(|a| a.iter().map(|v| v.as_str().map(str::to_string)).collect());
+    texts.ok_or_else(|| wrong(key, "a list of texts", Some(value)))
 }
 
 fn override_key(table: &mut toml::Table, item: &str) -> Result<(), CaseError> {

@@ -152,6 +152,7 @@ impl Expectation {
     ) -> Result<Self, CaseError> {
         check::simulation(&header.files.simulation, &simulation)?;
         check::ancillary(&header.files.ancillary, &ancillary)?;
+        check::drag(&header.files.ancillary, &header.vehicle, &ancillary)?;
         events.sort_by(|a, b| a.clock_s.total_cmp(&b.clock_s));
         Ok(Self { header, simulation, ancillary, events })
     }
@@ -161,7 +162,7 @@ impl Expectation {
     /// # Errors
     /// What is wrong with each of the files.
     pub fn from_texts(header: Header, texts: &Texts) -> Result<Self, Vec<CaseError>> {
-        let files = &header.files;
+        let files = header.files.clone();
         let simulation = || {
             let simulation = read::simulation(&files.simulation, read::given(&files.simulation, &texts.simulation)?)?;
             check::simulation(&files.simulation, &simulation).map(|()| simulation)
@@ -177,7 +178,8 @@ impl Expectation {
                 Self::new(header, simulation, ancillary, events).map_err(|error| vec![error])
             }
             (simulation, ancillary, events) => {
-                Err([simulation.err(), ancillary.err(), events.err()].into_iter().flatten().collect())
+                let errors = [simulation.err(), ancillary.err(), events.err()].into_iter().flatten();
+                Err(errors.map(|error| read::placed(error, &files, texts)).collect())
             }
         }
     }
@@ -199,8 +201,12 @@ impl Expectation {
 impl Case {
     /// From the texts of its files.
     pub fn from_texts(header: Header, texts: &Texts) -> Result<Self, CaseError> {
-        let name = header.files.recording.clone();
-        let recording = read::recording(&name, read::given(&name, &texts.recording)?)?;
+        let files = &header.files;
+        let read = || {
+            let recording = read::recording(&files.recording, read::given(&files.recording, &texts.recording)?)?;
+            check::recording(&files.recording, &recording).map(|()| recording)
+        };
+        let recording = read().map_err(|error| read::placed(error, files, texts))?;
         Self::of(header, recording, texts)
     }
 

@@ -1,6 +1,6 @@
 //! The CSV files of a case, by the names of their columns.
 
-use super::{Ancillary, Event, Recording, Simulation, WINDOWS_MIN, one_line};
+use super::{Ancillary, Event, Files, Recording, Simulation, Texts, WINDOWS_MIN, one_line};
 use crate::diagnose::error::CaseError;
 
 /// The text of a file the case names.
@@ -20,18 +20,31 @@ pub fn log(file: &str, text: &Option<String>) -> Result<Vec<Event>, CaseError> {
     }
 }
 
+/// An error whose line counts rows, one a line below the header, at the line of its file where that row is: there may be empty lines, and
+/// breaks in quotes.
+pub fn placed(mut error: CaseError, files: &Files, texts: &Texts) -> CaseError {
+    let all = [
+        (&files.recording, &texts.recording),
+        (&files.simulation, &texts.simulation),
+        (&files.ancillary, &texts.ancillary),
+        (&files.events, &texts.events),
+    ];
+    let of = error.file().and_then(|file| all.into_iter().find(|(name, _)| *name == file));
+    if let (Some((_, Some(text))), Some(line)) = (of, error.line_mut()) {
+        let mut reader = csv::ReaderBuilder::new().from_reader(text.as_bytes());
+        let row = reader.records().nth(*line - 2).and_then(Result::ok);
+        *line = row.and_then(|row| row.position().map(|place| place.line() as usize)).unwrap_or(*line);
+    }
+    error
+}
+
 /// Columns of a CSV by name, every cell a finite number.
 fn columns(file: &str, text: &str, names: &[&str]) -> Result<Vec<Vec<f64>>, CaseError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     let csv_error = |e: csv::Error| CaseError::Csv { file: file.into(), reason: one_line(&e.to_string()) };
     let header = reader.headers().map_err(csv_error)?.clone();
-    let places = names.iter().map(|name| {
-        header.iter().position(|h| h == *name).ok_or_else(|| CaseError::MissingColumn {
-            file: file.into(),
-            column: name.to_string(),
-            found: header.iter().collect::<Vec<_>>().join(", "),
-        })
-    });
+    let places =
+        names.iter().map(|name| header.iter().position(|h| h == *name).ok_or_else(|| missing(file, name, &header)));
     let places = places.collect::<Result<Vec<usize>, _>>()?;
     let mut out = vec![Vec::new(); names.len()];
     for (row, record) in reader.records().enumerate() {
@@ -52,6 +65,15 @@ fn columns(file: &str, text: &str, names: &[&str]) -> Result<Vec<Vec<f64>>, Case
         }
     }
     Ok(out)
+}
+
+/// A column that is not in a header: that may be no header, or a line of a file that is no text.
+fn missing(file: &str, column: &str, header: &csv::StringRecord) -> CaseError {
+    const SHOWN: usize = 300;
+    let found: String = header.iter().collect::<Vec<_>>().join(", ").escape_debug().take(SHOWN + 1).collect();
+    let found =
+        if found.chars().count() > SHOWN { found.chars().take(SHOWN).chain("...".chars()).collect() } else { found };
+    CaseError::MissingColumn { file: file.into(), column: column.into(), found }
 }
 
 /// Times that are enough and increase.
@@ -125,11 +147,7 @@ fn events(file: &str, text: &str) -> Result<Vec<Event>, CaseError> {
     let csv_error = |e: csv::Error| CaseError::Csv { file: file.into(), reason: one_line(&e.to_string()) };
     let header = reader.headers().map_err(csv_error)?.clone();
     let place = |name: &str| header.iter().position(|h| h == name);
-    let kind = place("kind").ok_or_else(|| CaseError::MissingColumn {
-        file: file.into(),
-        column: "kind".into(),
-        found: header.iter().collect::<Vec<_>>().join(", "),
-    })?;
+    let kind = place("kind").ok_or_else(|| missing(file, "kind", &header))?;
     let detail = place("detail");
     let mut events = Vec::new();
     for (i, record) in reader.records().enumerate() {

@@ -121,9 +121,9 @@ pub struct ArcAnswer {
     pub id: String,
     /// What is claimed of it.
     pub verdict: Verdict,
-    /// Its effects.
+    /// Its effects, in order of posterior.
     pub effects: Vec<Effect>,
-    /// Terms fitted to it together with all others, where what is left is given no cause.
+    /// Terms fitted to it together with all others, where what is left is given no cause, or that it alone does not show.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub fitted_beside: Vec<Effect>,
     /// RMS before.
@@ -157,6 +157,12 @@ pub struct StepAnswer {
 /// A parameter.
 pub fn parameter(name: &str, value: f64, sigma: f64, unit: &str) -> ParameterAnswer {
     ParameterAnswer { name: name.to_owned(), value, sigma, unit: unit.to_owned() }
+}
+
+/// Effects in order of posterior, those that are as likely as they stood.
+pub fn in_order(mut effects: Vec<Effect>) -> Vec<Effect> {
+    effects.sort_by(|a, b| b.posterior.total_cmp(&a.posterior));
+    effects
 }
 
 /// Posterior of an effect from its score, with even odds beforehand.

@@ -258,9 +258,9 @@ pub(super) fn clock(c: &mut Collector) {
 fn lines(revolutions: f64) -> Vec<Vec<f64>> {
     const SLOW: usize = 64;
     const STEP: f64 = 0.05;
-    let slow: Vec<f64> = (2..=SLOW).map(|i| 0.5 * i as f64 / revolutions).take_while(|cycles| *cycles < 1.0).collect();
+    let slow: Vec<f64> = (2..=SLOW).map(|i| 0.5 * i as f64 / revolutions).take_while(|cycles| *cycles <= 1.0).collect();
     let last = slow.last().copied().unwrap_or(0.0);
-    let quick = (1..=40).map(|i| STEP * f64::from(i)).filter(|cycles| *cycles > last + 0.5 * STEP);
+    let quick = (1..=40).map(|i| STEP * f64::from(i)).filter(|cycles| *cycles > last);
     let quick = quick.chain([2.5, 8.0, 12.0, 16.0]).map(|cycles| vec![cycles]);
     slow.chunks(2).map(<[f64]>::to_vec).chain(quick).collect()
 }

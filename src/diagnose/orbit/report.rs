@@ -9,11 +9,14 @@ use super::manoeuvre::Manoeuvre;
 use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m};
 use crate::diagnose::answer::{Alternative, Interval, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
-    ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, StepAnswer, parameter, posterior,
+    ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, StepAnswer, in_order, parameter, posterior,
 };
 use crate::diagnose::measured::plates::OrbitPlate;
 use crate::diagnose::measured::spread::{median, scatter};
 use crate::diagnose::measured::{Answer, Plates};
+
+/// Posterior from which on a term that all arcs together show is an effect of one of them.
+const SHOWN: f64 = 0.5;
 
 /// Every arc's estimates of every accepted term.
 pub type Table = Vec<(Term, f64, Vec<Vec<Estimate>>)>;
@@ -56,7 +59,7 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
         cannot_tell_apart: Vec::new(),
         steps: steps(problem, search),
         notes: notes(problem, &arcs),
-        effects,
+        effects: in_order(effects),
         arcs,
     }
 }
@@ -211,15 +214,16 @@ fn arc_answer(problem: &Problem, search: &Search, table: &Table, i: usize) -> Ar
             problem.rms_max_m()
         );
         (Verdict::Unexplained, Vec::new(), effects, Some(note))
-    } else if effects.is_empty() {
-        (Verdict::Consistent, effects, Vec::new(), None)
     } else {
-        (Verdict::Explained, effects, Vec::new(), None)
+        // A term that all arcs together show need not show in each.
+        let (shown, beside): (Vec<Effect>, Vec<Effect>) =
+            effects.into_iter().partition(|effect| effect.posterior >= SHOWN);
+        (if shown.is_empty() { Verdict::Consistent } else { Verdict::Explained }, shown, beside, None)
     };
     ArcAnswer {
         id: arc.id.clone(),
         verdict,
-        effects,
+        effects: in_order(effects),
         fitted_beside,
         // The first level may hold the arc's velocity step already.
         rms_before: search

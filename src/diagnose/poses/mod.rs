@@ -13,7 +13,9 @@ use nalgebra::{DMatrix, DVector, Dyn, Owned, Vector3};
 
 use self::still::{Pose, find_poses};
 use crate::diagnose::answer::{Located, Verdict};
-use crate::diagnose::measured::answer::{ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, parameter, posterior};
+use crate::diagnose::measured::answer::{
+    ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, in_order, parameter, posterior,
+};
 use crate::diagnose::measured::plates::PosesPlate;
 use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates, texts};
 use crate::math::rms::rms;
@@ -396,6 +398,7 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
         one.rms = vec![found.fits[i].rms_from(&found.fits[i + 1])];
         effects.push(one);
     }
+    let effects = in_order(effects);
     let step = |(i, fit): (usize, &Triad)| StepAnswer {
         added: i.checked_sub(1).map(|i| found.added[i].0.id().to_owned()),
         rms: fit.rms(),

@@ -5,7 +5,9 @@ use super::follow::Follows;
 use super::read::{Axis, Series};
 use super::search::{AxisFound, held_out, regress};
 use crate::diagnose::answer::{Covariate, Interval, Located, ParameterAnswer, Verdict};
-use crate::diagnose::measured::answer::{ArcAnswer, Effect, Fit, HeldOut, Level, Limit, parameter, posterior};
+use crate::diagnose::measured::answer::{
+    ArcAnswer, Effect, Fit, HeldOut, Level, Limit, in_order, parameter, posterior,
+};
 use crate::diagnose::measured::spread::median;
 use crate::diagnose::measured::{Answer, MeasuredCase};
 
@@ -43,7 +45,7 @@ pub fn answer(case: &MeasuredCase, series: &Series, found: &[AxisFound]) -> Answ
         cannot_tell_apart: Vec::new(),
         steps: Vec::new(),
         notes: notes.collect(),
-        effects,
+        effects: in_order(effects),
         arcs,
     }
 }
@@ -120,7 +122,7 @@ impl Row<'_> {
         ArcAnswer {
             id: self.axis.column.clone(),
             verdict,
-            effects,
+            effects: in_order(effects),
             fitted_beside: Vec::new(),
             rms_before: first.rms(),
             rms_after: last.rms(),

@@ -27,7 +27,7 @@ use self::unnamed::{hypothesis, of_failure, of_remains};
 use super::answer::{Diagnosis, Located, Source, Verdict};
 use super::bursts::OUT;
 use super::case::{Event, SPIKE};
-use super::catalogue::Effect;
+use super::catalogue::{self, Effect};
 use super::design::Frame;
 use super::instants::recurring;
 use super::locate;
@@ -220,6 +220,11 @@ fn of_windows(scene: &Scene) -> Vec<String> {
         notes.push(format!(
             "{of_spikes} windows are left out: they stand alone, more than {SPIKE} standard deviations from those before and after"
         ));
+    }
+    for token in &scene.case.header.includes {
+        if !catalogue::ALL.iter().any(|effect| effect.id == token) {
+            notes.push(format!("case.toml says that the simulation includes {token}: that is none of the effects known, and is not tested"));
+        }
     }
     let [start_s, end_s] = scene.span_s();
     let events = &scene.case.events;
