@@ -26,6 +26,7 @@ pub mod open_form;
 mod optimise;
 pub mod orbit;
 pub mod order;
+mod overrides;
 mod plates;
 pub mod poses;
 pub mod recorder;

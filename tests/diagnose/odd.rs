@@ -189,7 +189,8 @@ fn every_length_of_record_has_an_answer_without_absurd_limits() {
 #[test]
 fn a_mission_of_today_is_diagnosed() {
     let (value, sigma, _) = drag(&files());
-    let (now, ..) = drag(&with_key("epoch_utc", "\"2026-11-20T00:00:00Z\""));
+    // As an instant of TOML's own.
+    let (now, ..) = drag(&with_key("epoch_utc", "2026-11-20T00:00:00Z"));
     assert!((now - value).abs() < 2.0 * sigma, "{now} for {value}");
 }
 

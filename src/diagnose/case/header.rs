@@ -4,6 +4,7 @@ use jiff::Timestamp;
 
 use super::one_line;
 use crate::diagnose::error::CaseError;
+use crate::diagnose::overrides;
 
 /// `case.toml`, checked. What other kinds add stays in `table`.
 #[derive(Debug, Clone)]
@@ -107,12 +108,16 @@ impl Header {
         let mut table: toml::Table =
             text.parse().map_err(|e: toml::de::Error| CaseError::Toml(one_line(&e.to_string())))?;
         for item in set {
-            override_key(&mut table, item)?;
+            overrides::set(&mut table, item).ok_or_else(|| CaseError::Key {
+                key: item.into(),
+                expected: "key=value",
+                found: item.into(),
+            })?;
         }
         let kind = string(&table, "recording.kind")?;
         let of_a_vehicle = matches!(kind.as_str(), "acceleration_csv" | "recorder_dump");
         let vehicle = Vehicle::of(&table, of_a_vehicle)?;
-        let epoch = string(&table, "case.epoch_utc")
+        let epoch = moment(&table, "case.epoch_utc")
             .or_else(|e| if of_a_vehicle { Err(e) } else { Ok("1970-01-01T00:00:00Z".into()) })?;
         let epoch_utc = epoch.parse().map_err(|_| CaseError::Key {
             key: "case.epoch_utc".into(),
@@ -173,6 +178,12 @@ fn string(table: &toml::Table, key: &str) -> Result<String, CaseError> {
     value.and_then(|v| v.as_str()).map(str::to_string).ok_or_else(|| wrong(key, "a text", value))
 }
 
+/// A text, or an instant as TOML itself has it.
+fn moment(table: &toml::Table, key: &str) -> Result<String, CaseError> {
+    let written = lookup(table, key).and_then(toml::Value::as_datetime);
+    written.map_or_else(|| string(table, key), |at| Ok(at.to_string()))
+}
+
 fn number(value: &toml::Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|i| i as f64)).filter(|x| x.is_finite())
 }
@@ -194,26 +205,4 @@ fn words(table: &toml::Table, key: &str) -> Result<Vec<String>, CaseError> {
     let Some(value) = lookup(table, key) else { return Ok(Vec::new()) };
     let texts = value.as_array().and_then(|a| a.iter().map(|v| v.as_str().map(str::to_string)).collect());
     texts.ok_or_else(|| wrong(key, "a list of texts", Some(value)))
-}
-
-fn override_key(table: &mut toml::Table, item: &str) -> Result<(), CaseError> {
-    let bad = || CaseError::Key { key: item.into(), expected: "key=value", found: item.into() };
-    let (key, value) = item.split_once('=').ok_or_else(bad)?;
-    let value: toml::Value = format!("v = {value}")
-        .parse::<toml::Table>()
-        .ok()
-        .and_then(|mut t| t.remove("v"))
-        .unwrap_or_else(|| toml::Value::String(value.into()));
-    let mut parts: Vec<&str> = key.trim().split('.').collect();
-    let last = parts.pop().ok_or_else(bad)?;
-    let mut place = table;
-    for part in parts {
-        place = place
-            .entry(part)
-            .or_insert_with(|| toml::Value::Table(toml::Table::new()))
-            .as_table_mut()
-            .ok_or_else(bad)?;
-    }
-    place.insert(last.into(), value);
-    Ok(())
 }

@@ -17,6 +17,7 @@ pub use answer::Answer;
 pub use plates::Plates;
 
 use crate::diagnose::orbit::{self, OrbitError};
+use crate::diagnose::overrides;
 
 /// A case of these kinds that cannot be analysed.
 #[derive(Debug, Error)]
@@ -103,7 +104,11 @@ impl MeasuredCase {
         let mut table: toml::Table =
             text.parse().map_err(|e: toml::de::Error| MeasuredError::Toml(e.message().to_owned()))?;
         for one in overrides {
-            set(&mut table, one)?;
+            overrides::set(&mut table, one).ok_or_else(|| MeasuredError::Key {
+                key: one.clone(),
+                expected: "key=value",
+                found: one.clone(),
+            })?;
         }
         let wrong = |key: &str, expected| MeasuredError::Key {
             key: key.to_owned(),
@@ -197,22 +202,6 @@ pub fn lookup<'a>(table: &'a toml::Table, key: &str) -> Option<&'a toml::Value> 
 /// A list of texts at a dotted key.
 pub fn texts(table: &toml::Table, key: &str) -> Option<Vec<String>> {
     lookup(table, key)?.as_array()?.iter().map(|v| v.as_str().map(str::to_owned)).collect()
-}
-
-fn set(table: &mut toml::Table, item: &str) -> Result<(), MeasuredError> {
-    let bad = || MeasuredError::Key { key: item.to_owned(), expected: "key=value", found: item.to_owned() };
-    let (key, value) = item.split_once('=').ok_or_else(bad)?;
-    let parsed = format!("v = {value}").parse::<toml::Table>().ok().and_then(|mut t| t.remove("v"));
-    let value = parsed.unwrap_or_else(|| toml::Value::String(value.to_owned()));
-    let mut parts: Vec<&str> = key.trim().split('.').collect();
-    let last = parts.pop().ok_or_else(bad)?;
-    let mut place = table;
-    for part in parts {
-        let next = place.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new()));
-        place = next.as_table_mut().ok_or_else(bad)?;
-    }
-    place.insert(last.to_owned(), value);
-    Ok(())
 }
 
 #[cfg(test)]

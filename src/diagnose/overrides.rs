@@ -1,0 +1,37 @@
+//! Keys of a `case.toml` set from the command line.
+
+/// Sets a dotted key of a table as `key=value` says, the value as TOML has it or else as a text; `None` where that is no such item, or a
+/// part of the key is a value already.
+pub fn set(table: &mut toml::Table, item: &str) -> Option<()> {
+    let (key, value) = item.split_once('=')?;
+    let parsed = format!("v = {value}").parse::<toml::Table>().ok().and_then(|mut t| t.remove("v"));
+    let value = parsed.unwrap_or_else(|| toml::Value::String(value.to_owned()));
+    let mut parts: Vec<&str> = key.split('.').map(str::trim).collect();
+    if parts.iter().any(|part| part.is_empty()) {
+        return None;
+    }
+    let last = parts.pop()?;
+    let mut place = table;
+    for part in parts {
+        place = place.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new())).as_table_mut()?;
+    }
+    place.insert(last.to_owned(), value);
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_is_set_as_what_it_is_and_no_key_is_none() {
+        let mut table: toml::Table = "[vehicle]\nmass_kg = 5.0\n".parse().unwrap();
+        set(&mut table, "vehicle.mass_kg=104500").unwrap();
+        set(&mut table, " recording.kind = orbit_sp3").unwrap();
+        assert_eq!(table["vehicle"]["mass_kg"].as_integer(), Some(104_500));
+        assert_eq!(table["recording"]["kind"].as_str().map(str::trim), Some("orbit_sp3"));
+        for item in ["mass_kg", "=5", "vehicle..x=5", ".x=5", "vehicle.mass_kg.x=5"] {
+            assert_eq!(set(&mut table, item), None, "{item}");
+        }
+    }
+}
