@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::physics::{self, Mat3, Vec3};
 use crate::units::NANO_G_M_S2;
 
-use super::case::{Case, Expectation, HALF_WINDOW_S, Header};
+use super::case::{Case, Expectation, HALF_WINDOW_S};
 use super::earlier;
 use super::error::CaseError;
 use super::measure::{Measurement, coverage};
@@ -99,7 +99,7 @@ impl Surroundings {
         let v_m_s: Vec<Vec3> = anc.v_m_s.iter().map(vector).collect();
         let w_rad_s: Vec<Vec3> = anc.w_rad_s.iter().map(vector).collect();
         let body = bodies(&anc.q)?;
-        let vehicle = vehicle(&expected.header);
+        let vehicle = expected.header.vehicle.for_physics();
         let unix: Vec<f64> = anc.clock_s.iter().map(|t| expected.header.unix_s(*t)).collect();
         let sun: Vec<Vec3> = unix.iter().map(|t| physics::sun::direction(*t)).collect();
         let sunlit = r_m.iter().zip(&sun).map(|(r, s)| physics::shadow::sunlit_fraction(r, s)).collect();
@@ -298,17 +298,6 @@ impl<'a> Scene<'a> {
 /// Whether the crew sleeps, by its log, for most of each window.
 fn asleep(case: &Case) -> Vec<bool> {
     coverage(&case.recording.clock_s, &case.spans("crew_sleep")).iter().map(|share| *share > 0.5).collect()
-}
-
-fn vehicle(header: &Header) -> physics::vehicle::Vehicle {
-    let v = &header.vehicle;
-    physics::vehicle::Vehicle {
-        mass_kg: v.mass_kg,
-        drag_coefficient: v.drag_coefficient,
-        area_m2: Vec3::from(v.area_m2),
-        sensor_offset_m: Vec3::from(v.sensor_offset_m),
-        srp_coefficient: v.srp_coefficient,
-    }
 }
 
 fn bodies(q: &[[f64; 4]]) -> Result<Vec<Mat3>, CaseError> {

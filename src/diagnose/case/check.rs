@@ -2,6 +2,8 @@
 
 use super::{Ancillary, Recording, Simulation, Vehicle, WINDOWS_MIN, motion};
 use crate::diagnose::error::CaseError;
+use crate::physics::Vec3;
+use crate::physics::drag::acceleration_m_s2;
 use crate::units::NANO_G_M_S2;
 
 /// Nothing on a vehicle in orbit is accelerated by more, ng.
@@ -54,13 +56,15 @@ pub fn ancillary(file: &str, ancillary: &Ancillary) -> Result<(), CaseError> {
     motion::agree(file, ancillary)
 }
 
-/// The drag that density, mass and area make: a vehicle that is braked by more does not stay in orbit.
+/// The drag that density, mass and area make, the largest side ahead: a vehicle that is braked by more does not stay in orbit.
 pub fn drag(file: &str, vehicle: &Vehicle, ancillary: &Ancillary) -> Result<(), CaseError> {
-    let largest_m2 = vehicle.area_m2.iter().fold(0.0_f64, |largest, area| largest.max(*area));
-    let per_density = 0.5 * vehicle.drag_coefficient * largest_m2 / vehicle.mass_kg / NANO_G_M_S2;
-    let rows = ancillary.density_kg_m3.iter().zip(&ancillary.v_m_s);
-    let drag_ng: Vec<f64> =
-        rows.map(|(density, v)| per_density * density * v.iter().map(|c| c * c).sum::<f64>()).collect();
+    let vehicle = vehicle.for_physics();
+    let largest = vehicle.area_m2.imax();
+    let drag_ng = |(density, v): (&f64, &[f64; 3])| {
+        let ahead = Vec3::ith(largest, Vec3::from(*v).norm());
+        acceleration_m_s2(&vehicle, *density, &ahead).norm() / NANO_G_M_S2
+    };
+    let drag_ng: Vec<f64> = ancillary.density_kg_m3.iter().zip(&ancillary.v_m_s).map(drag_ng).collect();
     let column = "drag by density_kg_m3 and case.toml's mass_kg, area_m2 and drag_coefficient";
     typical(file, column, &drag_ng, "ng", 0.0, DRAG_MAX_NG)
 }

@@ -4,7 +4,8 @@ use jiff::Timestamp;
 
 use super::one_line;
 use crate::diagnose::error::CaseError;
-use crate::diagnose::overrides;
+use crate::diagnose::keys::{self, lookup};
+use crate::physics::{self, Vec3};
 
 /// `case.toml`, checked. What other kinds add stays in `table`.
 #[derive(Debug, Clone)]
@@ -61,6 +62,17 @@ pub struct Vehicle {
 const OFFSET_MAX_M: f64 = 100.0;
 
 impl Vehicle {
+    /// As its surface forces see it.
+    pub fn for_physics(&self) -> physics::vehicle::Vehicle {
+        physics::vehicle::Vehicle {
+            mass_kg: self.mass_kg,
+            drag_coefficient: self.drag_coefficient,
+            area_m2: Vec3::from(self.area_m2),
+            sensor_offset_m: Vec3::from(self.sensor_offset_m),
+            srp_coefficient: self.srp_coefficient,
+        }
+    }
+
     /// From `[vehicle]`; where a recording is compared with a simulation of it, all but the coefficient of radiation must be there.
     fn of(table: &toml::Table, needed: bool) -> Result<Self, CaseError> {
         let number = |key: &str, usual: f64| {
@@ -108,7 +120,7 @@ impl Header {
         let mut table: toml::Table =
             text.parse().map_err(|e: toml::de::Error| CaseError::Toml(one_line(&e.to_string())))?;
         for item in set {
-            overrides::set(&mut table, item).ok_or_else(|| CaseError::Key {
+            keys::set(&mut table, item).ok_or_else(|| CaseError::Key {
                 key: item.into(),
                 expected: "key=value",
                 found: item.into(),
@@ -139,7 +151,13 @@ impl Header {
             liftoff_clock_s: number_or(&table, "case.liftoff_clock_s", 0.0)?,
             span_s: [start_s, end_s],
             vehicle,
-            includes: words(&table, "simulation.includes")?,
+            includes: match lookup(&table, "simulation.includes") {
+                None => Vec::new(),
+                claims => {
+                    let texts = keys::texts(&table, "simulation.includes");
+                    texts.ok_or_else(|| wrong("simulation.includes", "a list of texts", claims))?
+                }
+            },
             kind,
             files: Files {
                 recording: string(&table, "recording.file").unwrap_or_default(),
@@ -158,15 +176,6 @@ impl Header {
     pub fn unix_s(&self, clock_s: f64) -> f64 {
         self.epoch_utc.as_millisecond() as f64 / 1000.0 + clock_s
     }
-}
-
-fn lookup<'a>(table: &'a toml::Table, key: &str) -> Option<&'a toml::Value> {
-    let mut parts = key.split('.');
-    let mut value = table.get(parts.next()?)?;
-    for part in parts {
-        value = value.as_table()?.get(part)?;
-    }
-    Some(value)
 }
 
 fn wrong(key: &str, expected: &'static str, found: Option<&toml::Value>) -> CaseError {
@@ -199,10 +208,4 @@ fn triple_or(table: &toml::Table, key: &str, default: [f64; 3]) -> Result<[f64; 
     let Some(value) = lookup(table, key) else { return Ok(default) };
     let numbers: Option<Vec<f64>> = value.as_array().and_then(|a| a.iter().map(number).collect());
     numbers.and_then(|n| n.try_into().ok()).ok_or_else(|| wrong(key, "three finite numbers", Some(value)))
-}
-
-fn words(table: &toml::Table, key: &str) -> Result<Vec<String>, CaseError> {
-    let Some(value) = lookup(table, key) else { return Ok(Vec::new()) };
-    let texts = value.as_array().and_then(|a| a.iter().map(|v| v.as_str().map(str::to_string)).collect());
-    texts.ok_or_else(|| wrong(key, "a list of texts", Some(value)))
 }

@@ -16,8 +16,8 @@ use thiserror::Error;
 pub use answer::Answer;
 pub use plates::Plates;
 
+use crate::diagnose::keys::{self, lookup, texts};
 use crate::diagnose::orbit::{self, OrbitError};
-use crate::diagnose::overrides;
 
 /// A case of these kinds that cannot be analysed.
 #[derive(Debug, Error)]
@@ -104,7 +104,7 @@ impl MeasuredCase {
         let mut table: toml::Table =
             text.parse().map_err(|e: toml::de::Error| MeasuredError::Toml(e.message().to_owned()))?;
         for one in overrides {
-            overrides::set(&mut table, one).ok_or_else(|| MeasuredError::Key {
+            keys::set(&mut table, one).ok_or_else(|| MeasuredError::Key {
                 key: one.clone(),
                 expected: "key=value",
                 found: one.clone(),
@@ -187,21 +187,6 @@ fn kind(table: &toml::Table) -> Option<Kind> {
         "static_poses" => Some(Kind::StaticPoses),
         _ => None,
     }
-}
-
-/// The value at a dotted key.
-pub fn lookup<'a>(table: &'a toml::Table, key: &str) -> Option<&'a toml::Value> {
-    let mut parts = key.split('.');
-    let mut value = table.get(parts.next()?)?;
-    for part in parts {
-        value = value.as_table()?.get(part)?;
-    }
-    Some(value)
-}
-
-/// A list of texts at a dotted key.
-pub fn texts(table: &toml::Table, key: &str) -> Option<Vec<String>> {
-    lookup(table, key)?.as_array()?.iter().map(|v| v.as_str().map(str::to_owned)).collect()
 }
 
 #[cfg(test)]

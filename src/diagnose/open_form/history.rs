@@ -8,6 +8,9 @@ use crate::diagnose::scene::Scene;
 use crate::math::robust::median;
 use crate::physics::Vec3;
 
+/// Times in which what a logged event begins dies away, s: a factor of three apart, between which a decay hardly differs.
+const EVENT_TAUS_S: [f64; 4] = [200.0, 600.0, 2000.0, 6000.0];
+
 /// Decays after instants, each forgetting the one before: exp(-(t - last)/tau).
 pub(super) fn since(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f64> {
     let next = |n: usize| instants.get(n + 1).map_or(f64::INFINITY, |(t, _)| *t);
@@ -69,7 +72,7 @@ pub(super) fn events(c: &mut Collector) {
         let spans = s.case.spans(kind);
         let starts: Vec<(f64, f64)> = spans.iter().map(|x| (x[0], 1.0)).collect();
         let ends: Vec<(f64, f64)> = spans.iter().map(|x| (x[1], 1.0)).collect();
-        for tau in [200.0, 600.0, 2000.0, 6000.0] {
+        for tau in EVENT_TAUS_S {
             for (what, list) in
                 [("start", &starts), ("end", &ends)].iter().filter(|(_, list)| !begins_once(s, list, tau))
             {
@@ -159,7 +162,7 @@ fn after_both_ends(s: &Scene, kind: &str, spans: &[[f64; 2]]) -> Vec<(String, Ve
     let mut lengths_s: Vec<f64> = spans.iter().map(|[start, end]| end - start).collect();
     let usual_s = median(&mut lengths_s).unwrap_or(0.0);
     let mut members = Vec::new();
-    for tau_s in [200.0, 600.0, 2000.0, 6000.0].into_iter().filter(|tau_s| *tau_s < usual_s) {
+    for tau_s in EVENT_TAUS_S.into_iter().filter(|tau_s| *tau_s < usual_s) {
         for (sense, words) in [(1.0, ""), (-1.0, ", signed")] {
             let mut changes: Vec<(f64, f64)> = spans.iter().flat_map(|[a, b]| [(*a, 1.0), (*b, sense)]).collect();
             changes.sort_by(|a, b| a.0.total_cmp(&b.0));

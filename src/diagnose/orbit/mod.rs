@@ -15,7 +15,8 @@ use thiserror::Error;
 use self::arc::Arc;
 use self::forces::{Baseline, Environment, Term};
 use self::search::Problem;
-use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates, lookup, texts};
+use crate::diagnose::keys::{lookup, texts};
+use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates};
 use crate::physics::earth_orientation::{EarthOrientation, EarthOrientationError};
 use crate::physics::gravity_field::{GravityField, GravityFieldError};
 

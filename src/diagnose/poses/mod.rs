@@ -13,11 +13,12 @@ use nalgebra::{DMatrix, DVector, Dyn, Owned, Vector3};
 
 use self::still::{Pose, find_poses};
 use crate::diagnose::answer::{Located, Verdict};
+use crate::diagnose::keys::texts;
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, in_order, parameter, posterior,
 };
 use crate::diagnose::measured::plates::PosesPlate;
-use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates, texts};
+use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates};
 use crate::math::rms::rms;
 
 /// Readings at zero acceleration that makers of triads use: none, or the middle of so many bits.

@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::diagnose::keys::lookup;
 use crate::diagnose::measured::spread::{median, scatter};
-use crate::diagnose::measured::{MeasuredCase, MeasuredError, lookup};
+use crate::diagnose::measured::{MeasuredCase, MeasuredError};
 
 /// Block means are formed so that about so many remain: fine enough for hours, few enough for dense algebra.
 const BLOCKS: f64 = 600.0;

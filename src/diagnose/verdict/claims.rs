@@ -1,12 +1,24 @@
 //! What the author of the simulation says it includes, held against what was found: claims are tested, not believed.
 
 use crate::diagnose::answer::{EffectAnswer, Verdict};
+use crate::diagnose::catalogue;
 use crate::diagnose::scene::Scene;
 
 /// Standard errors within which a fraction is that of a whole term.
 const WHOLE: f64 = 3.0;
 /// What a fraction of the whole term may lack for it to be called whole however small its error, for the analyser's term is not the author's.
 const WHOLE_WITHIN: f64 = 0.05;
+
+/// A sentence for each claim of what is no effect.
+pub fn of_unknown_claims(scene: &Scene) -> Vec<String> {
+    let unknown = |token: &&String| !catalogue::ALL.iter().any(|effect| effect.id == token.as_str());
+    let told = |token: &String| {
+        format!(
+            "case.toml says that the simulation includes {token}: that is none of the effects known, and is not tested"
+        )
+    };
+    scene.case.header.includes.iter().filter(unknown).map(told).collect()
+}
 
 /// A sentence for each claim that does not hold.
 pub fn of_claims(scene: &Scene, effects: &[EffectAnswer], verdict: Verdict) -> Vec<String> {

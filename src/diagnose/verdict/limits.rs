@@ -1,7 +1,7 @@
 //! How small everything that is not claimed must be.
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use crate::diagnose::answer::UpperLimit;
 use crate::diagnose::design::{Chosen, Column, Frame, Raw};
@@ -18,10 +18,8 @@ const PRIOR_NG: f64 = 300.0;
 const POINTS_MAX: usize = 100;
 /// Share of its largest value by which a series must vary to be more than a constant and its rounding.
 const ROUNDING: f64 = 1e-9;
-/// Degrees of freedom from which on a chi square is as good as a Gaussian here: their quantiles are a thousandth of it apart.
+/// Degrees of freedom from which on a chi square is as good as a Gaussian here: their quantiles are a ten-thousandth of it apart.
 const MANY: f64 = 1e4;
-/// Standard deviations below which a Gaussian stays with [`PROBABILITY`].
-const OF_A_GAUSSIAN: f64 = 1.644_853_626_951_472_2;
 
 /// 95 % limits on the size of every listed effect that is not claimed, beside what is.
 pub fn upper_limits(library: &Library, frame: &Frame, set: &Set) -> Vec<UpperLimit> {
@@ -78,7 +76,7 @@ fn quantile_of_square(mean: &DVector<f64>, covariance: &DMatrix<f64>, g: &DMatri
     }
     let degrees = 2.0 * expected * expected / variance;
     if degrees > MANY {
-        return expected + OF_A_GAUSSIAN * variance.sqrt();
+        return expected + Normal::standard().inverse_cdf(PROBABILITY) * variance.sqrt();
     }
     ChiSquared::new(degrees).map_or(f64::INFINITY, |chi2| expected / degrees * chi2.inverse_cdf(PROBABILITY))
 }

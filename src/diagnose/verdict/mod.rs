@@ -14,7 +14,7 @@ mod proportion;
 mod stands;
 mod unnamed;
 
-use self::claims::of_claims;
+use self::claims::{of_claims, of_unknown_claims};
 use self::credible::credible;
 use self::fit::fit;
 use self::judge::{Judged, judge};
@@ -27,7 +27,7 @@ use self::unnamed::{hypothesis, of_failure, of_remains};
 use super::answer::{Diagnosis, Located, Source, Verdict};
 use super::bursts::OUT;
 use super::case::{Event, SPIKE};
-use super::catalogue::{self, Effect};
+use super::catalogue::Effect;
 use super::design::Frame;
 use super::instants::recurring;
 use super::locate;
@@ -118,6 +118,7 @@ fn of_the_mismatch(
     proof: Proof,
 ) -> (Diagnosis, Axes, Vec<(String, f64)>) {
     let mut notes = of_windows(scene);
+    notes.extend(of_unknown_claims(scene));
     notes.extend(of_proportion(scene));
     notes.extend(of_resonances(&solution.null));
     notes.extend(of_colour(solution.statistic() - proof.statistic));
@@ -220,11 +221,6 @@ fn of_windows(scene: &Scene) -> Vec<String> {
         notes.push(format!(
             "{of_spikes} windows are left out: they stand alone, more than {SPIKE} standard deviations from those before and after"
         ));
-    }
-    for token in &scene.case.header.includes {
-        if !catalogue::ALL.iter().any(|effect| effect.id == token) {
-            notes.push(format!("case.toml says that the simulation includes {token}: that is none of the effects known, and is not tested"));
-        }
     }
     let [start_s, end_s] = scene.span_s();
     let events = &scene.case.events;

@@ -1,4 +1,19 @@
-//! Keys of a `case.toml` set from the command line.
+//! Dotted keys of a `case.toml`: looked up, and set from the command line.
+
+/// The value at a dotted key.
+pub fn lookup<'a>(table: &'a toml::Table, key: &str) -> Option<&'a toml::Value> {
+    let mut parts = key.split('.');
+    let mut value = table.get(parts.next()?)?;
+    for part in parts {
+        value = value.as_table()?.get(part)?;
+    }
+    Some(value)
+}
+
+/// A list of texts at a dotted key.
+pub fn texts(table: &toml::Table, key: &str) -> Option<Vec<String>> {
+    lookup(table, key)?.as_array()?.iter().map(|v| v.as_str().map(str::to_owned)).collect()
+}
 
 /// Sets a dotted key of a table as `key=value` says, the value as TOML has it or else as a text; `None` where that is no such item, or a
 /// part of the key is a value already.
