@@ -36,14 +36,20 @@ enum Command {
     Challenge(command::challenge::Args),
 }
 
-/// A reader that goes away (`oare diagnose CASE | head -1`) ends the command, and is no failure to report.
+/// A reader that goes away (`oare diagnose CASE | head -1`) ends the command, and is no failure to report; a full disk behind standard
+/// output is one.
 fn end_when_nobody_reads() {
     let report = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
-        if panic.payload_as_str().is_some_and(|text| text.starts_with("failed printing to stdout")) {
-            std::process::exit(0);
+        let unprinted = panic.payload_as_str().and_then(|text| text.strip_prefix("failed printing to stdout: "));
+        match unprinted {
+            Some(reason) if reason.starts_with("Broken pipe") => std::process::exit(0),
+            Some(reason) => {
+                eprintln!("oare: cannot write to standard output: {reason}");
+                std::process::exit(command::FAILED.into())
+            }
+            None => report(panic),
         }
-        report(panic);
     }));
 }
 

@@ -27,6 +27,9 @@ pub fn octets(directory: &Path, name: &str) -> Result<Option<Vec<u8>>, CaseError
     let path = directory.join(name);
     match std::fs::metadata(&path) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) if error.kind() == std::io::ErrorKind::NotADirectory => {
+            Err(unreadable(format!("a case is a directory, and {} is none", directory.display())))
+        }
         Err(error) => Err(unreadable(error.to_string())),
         Ok(metadata) if !metadata.is_file() => Err(unreadable("it is not a regular file".into())),
         Ok(_) => std::fs::read(&path).map(Some).map_err(|error| unreadable(error.to_string())),

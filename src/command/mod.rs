@@ -18,9 +18,12 @@ use std::process::ExitCode;
 /// Done.
 pub const DONE: ExitCode = ExitCode::SUCCESS;
 
+/// Code of [`failed`].
+pub const FAILED: u8 = 1;
+
 /// Failed.
 pub fn failed() -> ExitCode {
-    ExitCode::from(1)
+    ExitCode::from(FAILED)
 }
 
 /// Wrong usage, configuration, or an unusable case.

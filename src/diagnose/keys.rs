@@ -15,6 +15,20 @@ pub fn texts(table: &toml::Table, key: &str) -> Option<Vec<String>> {
     lookup(table, key)?.as_array()?.iter().map(|v| v.as_str().map(str::to_owned)).collect()
 }
 
+/// The dotted keys of a table that are none of the known ones, in order.
+pub fn unknown(table: &toml::Table, known: &[&str]) -> Vec<String> {
+    let below = |(key, value): (&String, &toml::Value)| match value {
+        toml::Value::Table(inner) => {
+            let of_this = known.iter().filter_map(|known| known.strip_prefix(key.as_str()));
+            let known: Vec<&str> = of_this.filter_map(|rest| rest.strip_prefix('.')).collect();
+            unknown(inner, &known).iter().map(|rest| format!("{key}.{rest}")).collect()
+        }
+        _ if known.contains(&key.as_str()) => Vec::new(),
+        _ => vec![key.clone()],
+    };
+    table.iter().flat_map(below).collect()
+}
+
 /// Sets a dotted key of a table as `key=value` says, the value as TOML has it or else as a text; `None` where that is no such item, or a
 /// part of the key is a value already.
 pub fn set(table: &mut toml::Table, item: &str) -> Option<()> {
@@ -37,6 +51,12 @@ pub fn set(table: &mut toml::Table, item: &str) -> Option<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_key_that_is_none_of_the_known_is_found_at_any_depth() {
+        let table: toml::Table = "id = 1\n[case]\nid = 1\nepoch = 2\n[case.id2]\nx = 1\n".parse().unwrap();
+        assert_eq!(unknown(&table, &["case.id", "case.id2.y"]), ["case.epoch", "case.id2.x", "id"]);
+    }
 
     #[test]
     fn a_key_is_set_as_what_it_is_and_no_key_is_none() {

@@ -136,6 +136,10 @@ fn what_nothing_can_be_is_refused_with_its_place() {
             with_key("epoch_utc", "\"2050-01-01T00:00:00Z\""),
             "case.toml: `case.epoch_utc` or a position is out of range",
         ),
+        (
+            with_cell("recording.csv", Some(7), "dev_y_ng", "-3"),
+            "recording.csv, line 8: `dev_y_ng` is -3.000e0, and ng",
+        ),
         // Empty lines count.
         (
             with_lines("recording.csv", |lines| {
@@ -211,6 +215,12 @@ fn what_cannot_be_read_is_not_missing() {
     assert_eq!(read(), "simulation.csv: it is there and cannot be read: octet 15 is no UTF-8 text");
     std::fs::remove_file(folder.path().join("case.toml")).unwrap();
     assert!(read().starts_with("case.toml: there is none in "), "{}", read());
+    let file = folder.path().join("events.csv");
+    let of_a_file = engine::read(&Material::Directory(&file)).map(|_| ()).unwrap_err();
+    assert!(
+        of_a_file.contains("a case is a directory, and ") && of_a_file.ends_with("events.csv is none"),
+        "{of_a_file}"
+    );
 }
 
 #[test]
@@ -223,6 +233,26 @@ fn a_dump_without_a_window_says_so() {
     assert!(
         read(&files).err().unwrap_or_default().starts_with("recording.dump: no calibrated window is in its 0 octets")
     );
+}
+
+#[test]
+fn a_mistyped_key_is_told_and_blanks_at_the_end_are_nothing() {
+    let (value, _, notes) = drag(&files());
+    assert!(!notes.iter().any(|note| note.contains("is no key")), "{notes:?}");
+    let (beside, _, notes) = drag(&with_lines("case.toml", |lines| {
+        for line in lines.iter_mut().filter(|line| line.starts_with("srp_coefficient")) {
+            *line = line.replacen("srp", "spr", 1);
+        }
+    }));
+    assert!(
+        notes.contains(&"case.toml: `vehicle.spr_coefficient` is no key of a case, and is not read".into()),
+        "{notes:?}"
+    );
+    assert_eq!(beside, value);
+    for file in ["recording.csv", "simulation.csv", "ancillary.csv", "events.csv"] {
+        let (beside, ..) = drag(&with_lines(file, |lines| lines.push("   \n ".into())));
+        assert_eq!(beside, value, "{file}");
+    }
 }
 
 #[test]

@@ -12,6 +12,8 @@ const A_MAX_NG: f64 = 1e9;
 const DRAG_MAX_NG: f64 = 1e5;
 /// Columns of accelerations.
 const ACCELERATION: [&str; 3] = ["ax_ng", "ay_ng", "az_ng"];
+/// Columns of average deviations.
+const DEVIATION: [&str; 3] = ["dev_x_ng", "dev_y_ng", "dev_z_ng"];
 
 /// A recording: long enough, and in nano-g.
 pub fn recording(file: &str, recording: &Recording) -> Result<(), CaseError> {
@@ -22,7 +24,8 @@ pub fn recording(file: &str, recording: &Recording) -> Result<(), CaseError> {
         changes(file, ACCELERATION[k], &recording.a_ng[k])?;
         typical(file, ACCELERATION[k], &recording.a_ng[k], "ng", 1e-2, 1e7)?;
         each(file, ACCELERATION[k], &recording.a_ng[k], "ng", [-A_MAX_NG, A_MAX_NG])?;
-        typical(file, ["dev_x_ng", "dev_y_ng", "dev_z_ng"][k], &recording.dev_ng[k], "ng", 1e-3, 1e7)?;
+        typical(file, DEVIATION[k], &recording.dev_ng[k], "ng", 1e-3, 1e7)?;
+        each(file, DEVIATION[k], &recording.dev_ng[k], "ng", [0.0, A_MAX_NG])?;
     }
     Ok(())
 }

@@ -114,7 +114,32 @@ impl Vehicle {
     }
 }
 
+/// The keys of a case of accelerations.
+const KEYS: [&str; 16] = [
+    "case.id",
+    "case.epoch_utc",
+    "case.liftoff_clock_s",
+    "case.start_s",
+    "case.end_s",
+    "vehicle.mass_kg",
+    "vehicle.drag_coefficient",
+    "vehicle.area_m2",
+    "vehicle.sensor_offset_m",
+    "vehicle.srp_coefficient",
+    "simulation.file",
+    "simulation.includes",
+    "recording.file",
+    "recording.kind",
+    "ancillary.file",
+    "ancillary.events",
+];
+
 impl Header {
+    /// The dotted keys that the format does not have, and that nothing reads: one that is mistyped is among them.
+    pub fn unknown_keys(&self) -> Vec<String> {
+        keys::unknown(&self.table, &KEYS)
+    }
+
     /// Parse `case.toml`; `set` are `key=value` overrides of dotted keys.
     pub fn parse(text: &str, set: &[String]) -> Result<Self, CaseError> {
         let mut table: toml::Table =

@@ -31,16 +31,21 @@ pub fn placed(mut error: CaseError, files: &Files, texts: &Texts) -> CaseError {
     ];
     let of = error.file().and_then(|file| all.into_iter().find(|(name, _)| *name == file));
     if let (Some((_, Some(text))), Some(line)) = (of, error.line_mut()) {
-        let mut reader = csv::ReaderBuilder::new().from_reader(text.as_bytes());
+        let mut reader = table(text);
         let row = reader.records().nth(*line - 2).and_then(Result::ok);
         *line = row.and_then(|row| row.position().map(|place| place.line() as usize)).unwrap_or(*line);
     }
     error
 }
 
+/// Reader of a CSV; blanks around cells and behind the last row are none of it.
+fn table(text: &str) -> csv::Reader<&[u8]> {
+    csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.trim_end().as_bytes())
+}
+
 /// Columns of a CSV by name, every cell a finite number.
 fn columns(file: &str, text: &str, names: &[&str]) -> Result<Vec<Vec<f64>>, CaseError> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let mut reader = table(text);
     let csv_error = |e: csv::Error| CaseError::Csv { file: file.into(), reason: one_line(&e.to_string()) };
     let header = reader.headers().map_err(csv_error)?.clone();
     let places =
@@ -143,7 +148,7 @@ pub fn ancillary(file: &str, text: &str) -> Result<Ancillary, CaseError> {
 
 fn events(file: &str, text: &str) -> Result<Vec<Event>, CaseError> {
     let c = columns(file, text, &["clock_s", "duration_s"])?;
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let mut reader = table(text);
     let csv_error = |e: csv::Error| CaseError::Csv { file: file.into(), reason: one_line(&e.to_string()) };
     let header = reader.headers().map_err(csv_error)?.clone();
     let place = |name: &str| header.iter().position(|h| h == name);

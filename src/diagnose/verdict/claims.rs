@@ -1,4 +1,4 @@
-//! What the author of the simulation says it includes, held against what was found: claims are tested, not believed.
+//! What the case says of itself, held against what is known and what was found: claims are tested, not believed.
 
 use crate::diagnose::answer::{EffectAnswer, Verdict};
 use crate::diagnose::catalogue;
@@ -8,6 +8,12 @@ use crate::diagnose::scene::Scene;
 const WHOLE: f64 = 3.0;
 /// What a fraction of the whole term may lack for it to be called whole however small its error, for the analyser's term is not the author's.
 const WHOLE_WITHIN: f64 = 0.05;
+
+/// A sentence for each key of `case.toml` that nothing reads.
+pub fn of_unknown_keys(scene: &Scene) -> Vec<String> {
+    let told = |key: String| format!("case.toml: `{key}` is no key of a case, and is not read");
+    scene.case.header.unknown_keys().into_iter().map(told).collect()
+}
 
 /// A sentence for each claim of what is no effect.
 pub fn of_unknown_claims(scene: &Scene) -> Vec<String> {

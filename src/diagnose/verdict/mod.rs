@@ -14,7 +14,7 @@ mod proportion;
 mod stands;
 mod unnamed;
 
-use self::claims::{of_claims, of_unknown_claims};
+use self::claims::{of_claims, of_unknown_claims, of_unknown_keys};
 use self::credible::credible;
 use self::fit::fit;
 use self::judge::{Judged, judge};
@@ -118,6 +118,7 @@ fn of_the_mismatch(
     proof: Proof,
 ) -> (Diagnosis, Axes, Vec<(String, f64)>) {
     let mut notes = of_windows(scene);
+    notes.extend(of_unknown_keys(scene));
     notes.extend(of_unknown_claims(scene));
     notes.extend(of_proportion(scene));
     notes.extend(of_resonances(&solution.null));
