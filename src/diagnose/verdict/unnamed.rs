@@ -53,8 +53,7 @@ pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins
     let mut location = Vec::new();
     for (i, m) in best.set.members.iter().enumerate() {
         let Family::Open(form) = library.entries[m.entry].family else { continue };
-        let amplitudes: Vec<String> =
-            best.fits[i].parameters.iter().map(|p| format!("{:.1}({:.1})", p.value, p.sigma)).collect();
+        let amplitudes: Vec<String> = best.fits[i].parameters.iter().map(|p| with_error(p.value, p.sigma)).collect();
         let (said, member) = (&library.forms[form], m.theta[0] as usize);
         let deviations: Vec<String> = said.deviations[member].iter().map(|d| format!("{d:.4e}")).collect();
         formula.push(format!(
@@ -72,5 +71,23 @@ pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins
         axis: axis.join("; "),
         unit: "ng".into(),
         location: format!("It lives in {}. {READ}{failing}", location.join(" and ")),
+    }
+}
+
+/// A value and its standard error in brackets, to a tenth or, where the error is smaller, to its second figure.
+fn with_error(value: f64, sigma: f64) -> String {
+    let figures = if sigma > 0.0 { (1.0 - sigma.log10().floor()).clamp(1.0, 12.0) as usize } else { 1 };
+    format!("{value:.figures$}({sigma:.figures$})")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_coefficient_keeps_its_figures() {
+        assert_eq!(with_error(-12.34, 2.06), "-12.3(2.1)");
+        assert_eq!(with_error(0.0123, 0.00456), "0.0123(0.0046)");
+        assert_eq!(with_error(5.0, 0.0), "5.0(0.0)");
     }
 }
