@@ -45,6 +45,20 @@ pub fn manoeuvres(s: &Scene) -> Vec<(f64, f64)> {
     crossings(&s.grid_s, &acceleration, MANOEUVRE * usual + ROUNDING_RAD_S2)
 }
 
+/// Where changes of attitude begin, and where they end: a change that goes on by pushes near to each other is one.
+pub fn changes_of_attitude(s: &Scene) -> [Vec<f64>; 2] {
+    let pushes = manoeuvres(s);
+    let [begins, ends] = [1.0, -1.0].map(|sign| of_sign(&pushes, sign));
+    let apart = |a: f64, b: f64| b - a > STILL_S;
+    let first = begins.iter().enumerate().filter(|(i, t)| *i == 0 || apart(begins[i - 1], **t)).map(|(_, t)| *t);
+    let last = ends.iter().enumerate().filter(|(i, t)| ends.get(i + 1).is_none_or(|next| apart(**t, *next)));
+    [first.collect(), last.map(|(_, t)| *t).collect()]
+}
+
+fn of_sign(all: &[(f64, f64)], sign: f64) -> Vec<f64> {
+    all.iter().filter(|x| x.1 == sign).map(|x| x.0).collect()
+}
+
 /// All that recurs in a record.
 pub fn recurring(s: &Scene) -> Vec<Recurring> {
     let [start, end] = s.span_s();
@@ -56,17 +70,12 @@ pub fn recurring(s: &Scene) -> Vec<Recurring> {
             found.push(Recurring { what, at_s });
         }
     };
-    let of_sign = |all: &[(f64, f64)], sign: f64| all.iter().filter(|x| x.1 == sign).map(|x| x.0).collect::<Vec<f64>>();
     let edges = terminators(s);
     add("sunrise".into(), of_sign(&edges, 1.0));
     add("sunset".into(), of_sign(&edges, -1.0));
-    let pushes = manoeuvres(s);
-    let [begins, ends] = [1.0, -1.0].map(|sign| of_sign(&pushes, sign));
-    let apart = |a: f64, b: f64| b - a > STILL_S;
-    let first = begins.iter().enumerate().filter(|(i, t)| *i == 0 || apart(begins[i - 1], **t)).map(|(_, t)| *t);
-    let last = ends.iter().enumerate().filter(|(i, t)| ends.get(i + 1).is_none_or(|next| apart(**t, *next)));
-    add("start of a change of attitude".into(), first.collect());
-    add("end of a change of attitude".into(), last.map(|(_, t)| *t).collect());
+    let [begins, ends] = changes_of_attitude(s);
+    add("start of a change of attitude".into(), begins);
+    add("end of a change of attitude".into(), ends);
     for kind in s.case.kinds() {
         let spans = s.case.spans(kind);
         add(format!("start of {kind}"), spans.iter().map(|x| x[0]).collect());

@@ -124,14 +124,20 @@ pub fn union(mut spans: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 
 /// Share of each window that lies inside any of the spans; overlapping spans count each.
 pub fn coverage(clock_s: &[f64], spans: &[[f64; 2]]) -> Vec<f64> {
+    weighted_coverage(clock_s, spans.iter().map(|span| (*span, 1.0)))
+}
+
+/// The same of spans that count for so much each.
+pub fn weighted_coverage(clock_s: &[f64], spans: impl IntoIterator<Item = ([f64; 2], f64)>) -> Vec<f64> {
     let mut share = vec![0.0; clock_s.len()];
-    for &[from, to] in spans {
+    for ([from, to], weight) in spans {
         let first = clock_s.partition_point(|t| t + HALF_WINDOW_S <= from);
         for (i, t) in clock_s.iter().enumerate().skip(first) {
             if t - HALF_WINDOW_S >= to {
                 break;
             }
-            share[i] += ((t + HALF_WINDOW_S).min(to) - (t - HALF_WINDOW_S).max(from)).max(0.0) / (2.0 * HALF_WINDOW_S);
+            let inside = ((t + HALF_WINDOW_S).min(to) - (t - HALF_WINDOW_S).max(from)).max(0.0);
+            share[i] += weight * inside / (2.0 * HALF_WINDOW_S);
         }
     }
     share

@@ -1,9 +1,11 @@
 //! Forms with a memory: after the edges of the shadow, after logged events, after manoeuvres, late behind the attitude, with the time.
 
+use std::ops::{Add, Mul, Sub};
+
 use super::Collector;
 use crate::diagnose::case::HALF_WINDOW_S;
 use crate::diagnose::instants::{manoeuvres, terminators};
-use crate::diagnose::measure::{coverage, decay};
+use crate::diagnose::measure::{coverage, decay, weighted_coverage};
 use crate::diagnose::scene::Scene;
 use crate::math::robust::median;
 use crate::physics::Vec3;
@@ -94,6 +96,7 @@ pub(super) fn events(c: &mut Collector) {
             );
         }
         c.family("time_since_event", "after logged events", after_both_ends(s, kind, &spans));
+        c.family("time_since_event", "while logged events last", close_ones(s, kind, &spans));
         echoes(c, kind, &ends);
         for (what, list) in [("start", &starts), ("end", &ends)] {
             c.family("time_since_event", "between logged events", ramps(s, kind, what, list));
@@ -124,11 +127,14 @@ pub(super) fn events(c: &mut Collector) {
 }
 
 /// What follows a series late, by a relaxation of the first order from its first value on.
-fn follower(grid_s: &[f64], series: &[Vec3], tau_s: f64) -> Vec<Vec3> {
+pub(super) fn follower<T>(grid_s: &[f64], series: &[T], tau_s: f64) -> Vec<T>
+where
+    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
+{
     let mut state = series[0];
     let mut before_s = grid_s[0];
-    let follow = |(t, x): (&f64, &Vec3)| {
-        state = x + (state - x) * (-(t - before_s) / tau_s).exp();
+    let follow = |(t, x): (&f64, &T)| {
+        state = *x + (state - *x) * (-(t - before_s) / tau_s).exp();
         before_s = *t;
         state
     };
@@ -173,6 +179,20 @@ fn after_both_ends(s: &Scene, kind: &str, spans: &[[f64; 2]]) -> Vec<(String, Ve
         }
     }
     members
+}
+
+/// A push while an entry lasts that is the less the longer ago the one before ended: a pump, a valve, a tank that need time.
+fn close_ones(s: &Scene, kind: &str, spans: &[[f64; 2]]) -> Vec<(String, Vec<f64>)> {
+    const ENOUGH: usize = 8;
+    if spans.len() < ENOUGH {
+        return Vec::new();
+    }
+    let push = |tau_s: f64| {
+        let after = |pair: &[[f64; 2]]| (pair[1], (-(pair[1][0] - pair[0][1]).max(0.0) / tau_s).exp());
+        let formula = format!("{kind} lasts, exp(-(pause before it)/{tau_s:.0} s)");
+        (formula, weighted_coverage(s.clock_s(), spans.windows(2).map(after)))
+    };
+    EVENT_TAUS_S.into_iter().map(push).collect()
 }
 
 /// A push some time after every entry of the log, that dies away, each beside those before: delays closer than the time it lasts, so

@@ -1,6 +1,8 @@
 //! Forms of the sensor: its own signal, and its temperature.
 
+use super::history::follower;
 use super::{AXIS, Collector};
+use crate::diagnose::scene::Scene;
 use crate::physics::Vec3;
 
 pub(super) fn sensor(c: &mut Collector) {
@@ -76,7 +78,14 @@ pub(super) fn sensor(c: &mut Collector) {
             (format!("m{} beyond {level:.0} ng", AXIS[i]), beyond)
         });
         c.family("modelled_signal", place, beyond);
+        let late = [1000.0, 3000.0, 10_000.0].map(|tau_s| {
+            let late = follower(&s.grid_s, &s.simulated_grid_ng[i], tau_s);
+            (format!("m{}, relaxing in {tau_s:.0} s", AXIS[i]), s.measure_scalar(|g| late[g]))
+        });
+        c.family("modelled_signal", "after changes of the modelled signal", late);
+        c.grid(format!("m{} (T - <T>)", AXIS[i]), "temperature", place, |g| s.simulated_grid_ng[i][g] * (t[g] - mean));
     }
+    c.family("temperature", "between two temperatures", relays(s));
     c.vectors(
         "m (T - <T>)",
         "temperature",
@@ -85,4 +94,48 @@ pub(super) fn sensor(c: &mut Collector) {
             Vec3::new(s.simulated_grid_ng[0][g], s.simulated_grid_ng[1][g], s.simulated_grid_ng[2][g]) * (t[g] - mean)
         }],
     );
+}
+
+/// A relay by the temperature, as the thermostat of a heater: on below one level and off above another, each at one of these shares of
+/// the record. One level alone is a threshold.
+fn relays(s: &Scene) -> Vec<(String, Vec<f64>)> {
+    const LEVELS: usize = 11;
+    const WIDEST: usize = 4;
+    let t = &s.temperature_c;
+    let mut sorted = t.clone();
+    sorted.sort_by(f64::total_cmp);
+    let level = |i: usize| sorted[(sorted.len() - 1) * (2 * i + 1) / (2 * LEVELS)];
+    let mut members = Vec::new();
+    for low in 0..LEVELS {
+        for high in low + 1..=(low + WIDEST).min(LEVELS - 1) {
+            let (on_c, off_c) = (level(low), level(high));
+            let on = relay(t, on_c, off_c);
+            let said = format!("on below T = {on_c:.2} C until T = {off_c:.2} C");
+            members.push((said, s.measure_scalar(|g| on[g])));
+        }
+    }
+    members
+}
+
+/// 1 from where a series falls below one level until it rises above the other, else 0.
+fn relay(series: &[f64], on_below: f64, off_above: f64) -> Vec<f64> {
+    let first = series.iter().find(|x| **x < on_below || **x > off_above);
+    let mut on = first.is_some_and(|x| *x < on_below);
+    let follow = |x: &f64| {
+        on = *x < on_below || on && *x <= off_above;
+        f64::from(u8::from(on))
+    };
+    series.iter().map(follow).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_relay_holds_between_its_levels() {
+        let t = [5.0, 3.9, 4.5, 5.5, 4.5, 6.1, 4.5, 3.5, 4.5];
+        assert_eq!(relay(&t, 4.0, 6.0), [1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0]);
+        assert_eq!(relay(&[6.5, 5.0, 3.0, 5.0], 4.0, 6.0), [0.0, 0.0, 1.0, 1.0]);
+    }
 }

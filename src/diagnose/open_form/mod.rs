@@ -8,6 +8,7 @@ mod history;
 mod instrument;
 mod motion;
 mod places;
+mod resets;
 mod surroundings;
 
 pub use motion::angles as orbit_angles;
@@ -180,7 +181,7 @@ fn standard_vector(axes: &Axes) -> Option<(Axes, f64)> {
 }
 
 /// Who fills the dictionary, in the order in which its forms stand.
-const COLLECTORS: [fn(&mut Collector); 11] = [
+const COLLECTORS: [fn(&mut Collector); 12] = [
     motion::rates,
     motion::orbit,
     history::attitude,
@@ -192,6 +193,7 @@ const COLLECTORS: [fn(&mut Collector); 11] = [
     history::events,
     history::clock,
     places::places,
+    resets::resets,
 ];
 
 /// The dictionary for a case.

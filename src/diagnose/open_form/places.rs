@@ -86,6 +86,11 @@ fn thresholds(c: &mut Collector) {
     ];
     for k in 0..3 {
         covariates.push((format!("m{}", AXIS[k]), "modelled_signal", s.simulated_ng[k].clone()));
+        // What the Sun reaches within a cone about an axis of the body.
+        for (sign, name) in [(1.0, ""), (-1.0, "-")] {
+            let towards = |g: usize| sign * (s.body[g] * s.sun[g])[k] * s.sunlit[g];
+            covariates.push((format!("nu ({name}s{})", AXIS[k]), "sun_angle", grid(&towards)));
+        }
     }
     for (name, covariate, series) in covariates {
         let mut sorted = series.clone();
