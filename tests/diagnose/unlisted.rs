@@ -76,3 +76,70 @@ fn what_dies_away_after_falling_asleep_and_waking_is_no_crew_activity_and_no_lea
     };
     is_unlisted(&with(both, [0.7, 0.3, -0.3]), "start or end of crew_sleep, signed");
 }
+
+/// Grows from one calibration to the next: a sensor that is taken back to its place each time.
+#[test]
+fn what_every_gap_sets_back_is_no_drift() {
+    let sawtooth = |case: &Case| {
+        let clock_s = &case.recording.clock_s;
+        let mut from = clock_s[0];
+        let mut before = clock_s[0];
+        let grown = |t: &f64| {
+            from = if t - before > 130.0 { *t } else { from };
+            before = *t;
+            t - from
+        };
+        clock_s.iter().map(grown).collect()
+    };
+    is_unlisted(&with(sawtooth, [0.5, -0.4, 0.7]), "the last gap) / [");
+}
+
+/// One axis feels another late.
+#[test]
+fn a_late_copy_of_another_axis_is_no_scale_factor_and_no_misalignment() {
+    let late = |case: &Case| {
+        let simulation = &case.simulation;
+        let m = window_means(&simulation.clock_s, &simulation.a_ng[2], &case.recording.clock_s, 0.0);
+        let mut state = m[0];
+        let mut before = case.recording.clock_s[0];
+        let follow = |(t, m): (&f64, &f64)| {
+            state = m + (state - m) * (-(t - before) / 4000.0).exp();
+            before = *t;
+            state
+        };
+        case.recording.clock_s.iter().zip(&m).map(follow).collect()
+    };
+    is_unlisted(&with(late, [1.0, 0.0, 0.0]), "(mz, relaxing in ");
+}
+
+/// On below one temperature until another is reached.
+#[test]
+fn a_thermostat_is_no_step_and_no_temperature_bias() {
+    let heater = |case: &Case| {
+        let ancillary = &case.ancillary;
+        let t = window_means(&ancillary.clock_s, &ancillary.temperature_c, &case.recording.clock_s, 0.0);
+        let mut sorted = t.clone();
+        sorted.sort_by(f64::total_cmp);
+        let [low, high] = [0.36, 0.57].map(|share| sorted[(sorted.len() as f64 * share) as usize]);
+        let mut on = t[0] < low;
+        let follow = |t: &f64| {
+            on = *t < low || on && *t <= high;
+            f64::from(u8::from(on))
+        };
+        t.iter().map(follow).collect()
+    };
+    is_unlisted(&with(heater, [0.8, -0.5, 0.2]), "on below T = ");
+}
+
+/// A thruster that pushes the less the longer it has rested.
+#[test]
+fn what_only_a_thruster_still_warm_does_is_no_residual_of_every_firing() {
+    let warm = |case: &Case| {
+        let firings = case.spans("thruster");
+        let weights: Vec<f64> = firings.windows(2).map(|w| (-(w[1][0] - w[0][1]).max(0.0) / 400.0).exp()).collect();
+        let inside = |t: f64, [a, b]: [f64; 2]| ((t + 25.0).min(b) - (t - 25.0).max(a)).max(0.0) / 50.0;
+        let push = |t: &f64| firings[1..].iter().zip(&weights).map(|(span, weight)| weight * inside(*t, *span)).sum();
+        case.recording.clock_s.iter().map(push).collect()
+    };
+    is_unlisted(&with(warm, [0.6, 0.6, -0.3]), "thruster lasts, exp(-(pause before it)/");
+}

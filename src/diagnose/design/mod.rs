@@ -131,7 +131,7 @@ pub struct OnAxis<'a> {
 }
 
 /// Series of an axis that are whitened side by side.
-const LANES: usize = 4;
+const LANES: usize = 8;
 
 impl Column {
     fn of(parts: impl IntoIterator<Item = (usize, Part)>) -> Self {
