@@ -38,7 +38,7 @@ fn log_density(_: &Scene, _: &Theta) -> f64 {
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let inside = theta[0] > TAU_RANGE_S[0].ln() && theta[0] < TAU_RANGE_S[1].ln();
-    inside.then(|| Shape::scalar(&decay(scene.clock_s(), scene.case.simulation.clock_s[0], theta[0].exp())))
+    inside.then(|| Shape::scalar(decay(scene.clock_s(), scene.case.simulation.clock_s[0], theta[0].exp())))
 }
 
 #[cfg(test)]

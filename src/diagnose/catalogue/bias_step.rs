@@ -35,7 +35,7 @@ fn log_density(scene: &Scene, _: &Theta) -> f64 {
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let [start, end] = scene.span_s();
     (theta[0] > start + 300.0 && theta[0] < end - 300.0)
-        .then(|| Shape::scalar(&decay(scene.clock_s(), theta[0], f64::INFINITY)))
+        .then(|| Shape::scalar(decay(scene.clock_s(), theta[0], f64::INFINITY)))
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    lasting(scene, "crew_sleep").map(|asleep| Shape::scalar(&asleep.iter().map(|s| 1.0 - s).collect::<Vec<f64>>()))
+    lasting(scene, "crew_sleep").map(|asleep| Shape::scalar(asleep.iter().map(|s| 1.0 - s).collect::<Vec<f64>>()))
 }
 
 #[cfg(test)]

@@ -196,6 +196,8 @@ pub enum Shape {
         /// Its values from there to the last that is not zero.
         values: Vec<f64>,
     },
+    /// Several series at the windows, each with a coefficient for every body axis.
+    Several(Vec<Vec<f64>>),
     /// One series triple a coefficient.
     Columns(Vec<Raw>),
     /// A series whose amplitude is given by `Theta` alone.
@@ -204,9 +206,24 @@ pub enum Shape {
 
 impl Shape {
     /// One series, with a coefficient for every body axis.
-    pub fn scalar(series: &[f64]) -> Self {
-        let Stretch { first, values } = Stretch::of(series);
-        Shape::Scalar { windows: series.len(), first, values: values.to_vec() }
+    pub fn scalar(mut series: Vec<f64>) -> Self {
+        let windows = series.len();
+        let Stretch { first, values } = Stretch::of(&series);
+        let end = first + values.len();
+        series.truncate(end);
+        series.drain(..first);
+        series.shrink_to_fit();
+        Shape::Scalar { windows, first, values: series }
+    }
+
+    /// How many columns it has.
+    pub fn count(&self) -> usize {
+        match self {
+            Shape::Scalar { .. } => 3,
+            Shape::Several(series) => 3 * series.len(),
+            Shape::Columns(columns) => columns.len(),
+            Shape::Fixed(_) => 1,
+        }
     }
 
     /// As columns; a fixed shape is one column.
@@ -215,12 +232,18 @@ impl Shape {
             Shape::Scalar { windows, first, values } => {
                 let mut series = vec![0.0; *windows];
                 series[*first..first + values.len()].copy_from_slice(values);
-                (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| series.clone()))).collect()
+                on_each_axis(&series).collect()
             }
+            Shape::Several(series) => series.iter().flat_map(|series| on_each_axis(series)).collect(),
             Shape::Columns(columns) => columns.clone(),
             Shape::Fixed(axes) => vec![full(axes.clone())],
         }
     }
+}
+
+/// A series on one body axis, and on the next, and on the last.
+fn on_each_axis(series: &[f64]) -> impl Iterator<Item = Raw> {
+    (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| series.to_vec())))
 }
 
 impl Shape {
@@ -230,6 +253,13 @@ impl Shape {
             Shape::Scalar { first, values, .. } => {
                 let series = Stretch { first: *first, values };
                 (0..3).map(|axis| vec![OnAxis { axis, series, size: scale * sizes[axis] }]).collect()
+            }
+            Shape::Several(several) => {
+                let column = |(series, (axis, size))| vec![OnAxis { axis, series, size: scale * size }];
+                let sizes = sizes.chunks(3).map(|sizes| sizes.iter().copied().enumerate());
+                let of_each =
+                    several.iter().zip(sizes).flat_map(|(s, sizes)| std::iter::repeat(Stretch::of(s)).zip(sizes));
+                of_each.map(column).collect()
             }
             Shape::Columns(columns) => columns
                 .iter()

@@ -74,7 +74,7 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     } else {
         (&scene.grid_s, &scene.temperature_c)
     };
-    Some(Shape::scalar(&window_means(grid_s, temperature_c, scene.clock_s(), theta[0])))
+    Some(Shape::scalar(window_means(grid_s, temperature_c, scene.clock_s(), theta[0])))
 }
 
 fn assumes(scene: &Scene, theta: &Theta) -> Option<String> {

@@ -23,7 +23,7 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    added(scene, "thruster").map(|series| Shape::scalar(&series))
+    added(scene, "thruster").map(Shape::scalar)
 }
 
 #[cfg(test)]

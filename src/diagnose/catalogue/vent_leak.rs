@@ -48,7 +48,7 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let [start, end] = scene.span_s();
     let inside =
         theta[0] > start && theta[0] < end - 300.0 && theta[1] > TAU_RANGE_S[0].ln() && theta[1] < TAU_RANGE_S[1].ln();
-    inside.then(|| Shape::scalar(&decay(scene.clock_s(), theta[0], theta[1].exp())))
+    inside.then(|| Shape::scalar(decay(scene.clock_s(), theta[0], theta[1].exp())))
 }
 
 #[cfg(test)]

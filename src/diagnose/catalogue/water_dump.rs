@@ -23,7 +23,7 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    lasting(scene, "water_dump").map(|series| Shape::scalar(&series))
+    lasting(scene, "water_dump").map(Shape::scalar)
 }
 
 #[cfg(test)]

@@ -268,7 +268,8 @@ pub(super) fn clock(c: &mut Collector) {
     for near in lines((end - start) / s.period_s) {
         let sine_and_cosine = |cycles: &f64| {
             let rate = std::f64::consts::TAU * cycles / s.period_s;
-            let parts = [f64::sin, f64::cos].map(|of| s.measure_scalar(|g| of(rate * s.grid_s[g])));
+            let (sines, cosines): (Vec<f64>, Vec<f64>) = s.grid_s.iter().map(|t| (rate * t).sin_cos()).unzip();
+            let parts = [sines, cosines].map(|part| s.measure_scalar(|g| part[g]));
             (format!("sin, cos at {cycles:.3} cycles per orbit"), parts.to_vec())
         };
         c.several_family("per_orbit_line", "a line of the spectrum", near.iter().map(sine_and_cosine));

@@ -82,10 +82,10 @@ impl Collector<'_> {
         let mut said = Said { covariate, location, formulas: Vec::new(), deviations: Vec::new() };
         let mut shapes = Vec::new();
         for (formula, series) in members {
-            let Some((series, deviation)) = standard(&series) else { continue };
+            let Some((series, deviation)) = standard(series) else { continue };
             said.formulas.push(formula);
             said.deviations.push(vec![deviation]);
-            shapes.push(Shape::scalar(&series));
+            shapes.push(Shape::scalar(series));
         }
         if !shapes.is_empty() {
             self.atoms.push(Atom { said, shapes });
@@ -126,14 +126,14 @@ impl Collector<'_> {
         let mut said = Said { covariate, location, formulas: Vec::new(), deviations: Vec::new() };
         let mut shapes = Vec::new();
         for (formula, parts) in members {
-            let (series, deviations): (Vec<Vec<f64>>, Vec<f64>) = parts.iter().filter_map(|s| standard(s)).unzip();
-            if series.len() < parts.len() {
+            let count = parts.len();
+            let (series, deviations): (Vec<Vec<f64>>, Vec<f64>) = parts.into_iter().filter_map(standard).unzip();
+            if series.len() < count {
                 continue;
             }
-            let on_each_axis = |s: &Vec<f64>| [0, 1, 2].map(|k| std::array::from_fn(|j| (j == k).then(|| s.clone())));
             said.formulas.push(formula);
             said.deviations.push(deviations);
-            shapes.push(Shape::Columns(series.iter().flat_map(on_each_axis).collect()));
+            shapes.push(Shape::Several(series));
         }
         if !shapes.is_empty() {
             self.atoms.push(Atom { said, shapes });
@@ -158,7 +158,7 @@ impl Collector<'_> {
 }
 
 /// A series of unit deviation and the deviation it had, `None` for what hardly varies.
-fn standard(series: &[f64]) -> Option<(Vec<f64>, f64)> {
+fn standard(mut series: Vec<f64>) -> Option<(Vec<f64>, f64)> {
     let n = series.len() as f64;
     let mean = series.iter().sum::<f64>() / n;
     let deviation = (series.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
@@ -166,8 +166,8 @@ fn standard(series: &[f64]) -> Option<(Vec<f64>, f64)> {
     let zero_at_rest = series.iter().filter(|x| **x == 0.0).count() * 2 > series.len();
     // A form that is zero most of the time keeps its zeros: its support is where it lives.
     let shift = if zero_at_rest { 0.0 } else { mean };
-    (deviation.is_finite() && deviation > 1e-9 * largest && deviation > 0.0)
-        .then(|| (series.iter().map(|x| (x - shift) / deviation).collect(), deviation))
+    series.iter_mut().for_each(|x| *x = (*x - shift) / deviation);
+    (deviation.is_finite() && deviation > 1e-9 * largest && deviation > 0.0).then_some((series, deviation))
 }
 
 fn standard_vector(axes: &Axes) -> Option<(Axes, f64)> {

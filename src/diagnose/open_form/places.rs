@@ -31,13 +31,16 @@ fn circles(c: &mut Collector) {
         ("u - u_noon", "sun_phase", &noon),
         ("local time - 12 h", "local_time", &local),
     ] {
+        let directions: Vec<(f64, f64)> = angle.iter().map(|angle| angle.sin_cos()).collect();
         let members: Vec<(String, Vec<f64>)> = WIDTHS_DEG
             .iter()
             .flat_map(|width| (0..CENTRES).map(move |i| (*width, 360.0 * i as f64 / CENTRES as f64)))
             .map(|(width, centre)| {
                 // Von Mises: a bump on a circle.
                 let narrow = width.to_radians().powi(-2);
-                let series = s.measure_scalar(|g| (narrow * ((angle[g] - centre.to_radians()).cos() - 1.0)).exp());
+                let (sine, cosine) = centre.to_radians().sin_cos();
+                let along = |(sin, cos): (f64, f64)| sin * sine + cos * cosine;
+                let series = s.measure_scalar(|g| (narrow * (along(directions[g]) - 1.0)).exp());
                 (format!("a bump of {width:.0} deg at {name} = {centre:.0} deg"), series)
             })
             .collect();
@@ -48,10 +51,10 @@ fn circles(c: &mut Collector) {
 /// A push over one region of the Earth.
 fn regions(c: &mut Collector) {
     let s = c.scene;
-    let longitude: Vec<f64> = right_ascension_rad(c)
+    let longitude_deg: Vec<f64> = right_ascension_rad(c)
         .iter()
         .zip(&s.grid_s)
-        .map(|(a, t)| a - time::gmst_rad(s.case.header.unix_s(*t)))
+        .map(|(a, t)| (a - time::gmst_rad(s.case.header.unix_s(*t))).to_degrees().rem_euclid(360.0))
         .collect();
     let north: Vec<bool> = s.r_m.iter().map(|r| r.z > 0.0).collect();
     let mut members = Vec::new();
@@ -60,8 +63,9 @@ fn regions(c: &mut Collector) {
             for i in 0..18 {
                 let centre = 20.0 * f64::from(i);
                 let inside = |g: usize| {
-                    let away = (longitude[g].to_degrees() - centre + 540.0).rem_euclid(360.0) - 180.0;
-                    f64::from(u8::from(away.abs() < width && wanted.is_none_or(|n| n == north[g])))
+                    let away = (longitude_deg[g] - centre).abs();
+                    let near = away.min(360.0 - away) < width;
+                    f64::from(u8::from(near && wanted.is_none_or(|n| n == north[g])))
                 };
                 let formula = format!("within {width:.0} deg of longitude {centre:.0} deg{half}");
                 members.push((formula, s.measure_scalar(inside)));

@@ -48,10 +48,7 @@ impl Entry {
 
     /// An open form.
     pub fn open(index: usize, shapes: Vec<Shape>, log_prior: f64) -> Self {
-        let count = match shapes.first() {
-            Some(Shape::Columns(columns)) => columns.len(),
-            _ => 3,
-        };
+        let count = shapes.first().map_or(0, Shape::count);
         let sizes = vec![SIZE_NG; count];
         Self {
             family: Family::Open(index),

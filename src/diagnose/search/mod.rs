@@ -78,7 +78,9 @@ fn whiten(frame: &Frame, theta: Theta, shape: &Shape, entry: &Entry, scale: f64)
         Shape::Columns(raws) => {
             raws.iter().zip(&entry.sizes).map(|(raw, size)| frame.column(raw, scale * size)).collect()
         }
-        Shape::Scalar { .. } | Shape::Fixed(_) => frame.columns(&shape.on_axes(&entry.sizes, scale)),
+        Shape::Scalar { .. } | Shape::Several(_) | Shape::Fixed(_) => {
+            frame.columns(&shape.on_axes(&entry.sizes, scale))
+        }
     };
     Whitened::new(theta, shape, columns, entry, scale)
 }
