@@ -11,6 +11,7 @@ pub mod bootstrap;
 pub mod bursts;
 pub mod case;
 pub mod catalogue;
+pub mod constancy;
 pub mod design;
 mod earlier;
 pub mod error;

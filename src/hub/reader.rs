@@ -163,7 +163,9 @@ impl Reader {
         if head <= self.after {
             return None;
         }
-        let lost_through = state.forgotten_through.max(self.behind_max.map_or(0, |most| head.saturating_sub(most)));
+        // After a crash the numbers jump: that many are not that many messages.
+        let too_far = self.behind_max.filter(|most| head - self.after > *most);
+        let lost_through = state.forgotten_through.max(too_far.map_or(0, |most| state.before_the_last(most)));
         if lost_through > self.after {
             let from_seq = self.after + 1;
             let count = state.count_on(self.topics, self.after, lost_through);
@@ -256,6 +258,18 @@ impl State {
             Entry::Seconds { .. } => return None,
         };
         Some(Arc::new(Message::new(seq, body)))
+    }
+
+    /// Number of the message before the last so many, of whatever topic; 0 where there are no more.
+    fn before_the_last(&self, messages: u64) -> u64 {
+        let mut left = messages;
+        for entry in self.journal.iter().rev() {
+            if entry.count() > left {
+                return entry.last_seq() - left;
+            }
+            left -= entry.count();
+        }
+        0
     }
 
     /// Messages on these topics with numbers in (after, through].

@@ -76,7 +76,8 @@ impl Entry {
         self.points.iter().map(|(theta, _)| *theta).find(|theta| theta[0] == value)
     }
 
-    pub(super) fn effect(&self) -> Option<&'static Effect> {
+    /// The catalogue effect it is, if it is one.
+    pub fn effect(&self) -> Option<&'static Effect> {
         match self.family {
             Family::Listed(effect) => Some(effect),
             Family::Open(_) => None,

@@ -1,7 +1,7 @@
 //! What the evidence and the trial say, before what remains is asked.
 
 use super::credible::simplest;
-use super::stands::{fails, tried};
+use super::stands::{changes, fails, tried};
 use super::{EVIDENCE_SHARE, Proof};
 use crate::diagnose::answer::Verdict;
 use crate::diagnose::scene::Scene;
@@ -49,7 +49,8 @@ pub fn judge<'a>(
         (true, false, false) => (Verdict::Explained, Some(simplest(listed))),
     };
     let on_trial = chosen.map(|weighed| (weighed, tried(scene, library, weighed)));
-    let failure = on_trial.as_ref().and_then(|(_, tried)| fails(tried, statistic));
+    let changed = |weighed| (verdict == Verdict::Explained).then(|| changes(scene, library, weighed)).flatten();
+    let failure = on_trial.as_ref().and_then(|(weighed, tried)| fails(tried, statistic).or_else(|| changed(*weighed)));
     let (verdict, on_trial) = match &failure {
         Some(_) if probability > BEYOND_DOUBT * claim => (Verdict::Consistent, None),
         Some(_) => (Verdict::Unexplained, on_trial),

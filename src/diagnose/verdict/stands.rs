@@ -6,7 +6,9 @@
 //! that is predicted there, if the part fitted can say anything of it, shows a confirmation. An attitude left out can confirm
 //! nothing of an effect that happens in another.
 
+use super::effect_of;
 use crate::diagnose::answer::HeldOut;
+use crate::diagnose::constancy::{Follows, follows_most};
 use crate::diagnose::scene::Scene;
 use crate::diagnose::search::Weighed;
 use crate::diagnose::solve::Library;
@@ -23,6 +25,25 @@ const CONFIRMS: f64 = 0.3;
 const WEAK: f64 = 6.0;
 /// Log evidence by which a finding must be above its placebo: odds of twenty.
 const ABOVE_PLACEBO: f64 = 3.0;
+
+/// Log odds (of a hundred and fifty) from which on the size of a member follows something, and the share of its size that must.
+const FOLLOWS: f64 = 5.0;
+const FOLLOWS_SHARE: f64 = 0.2;
+
+/// Why a set of effects is none of them, where the size of one is not the same throughout.
+pub fn changes(scene: &Scene, library: &Library, weighed: &Weighed) -> Option<String> {
+    let (frame, set) = weighed.framed(scene, &library.entries);
+    let found = follows_most(scene, &frame, &library.entries, &set)?;
+    let Follows { member, what, change, sigma, log_odds } = found;
+    let id = effect_of(&library.entries, &set, member)?.id;
+    let (percent, error) = (100.0 * change, 100.0 * sigma);
+    (log_odds > FOLLOWS && change.abs() > FOLLOWS_SHARE).then(|| {
+        format!(
+            "a finding is refused: the size of {id} is not the same throughout, but follows {what} ({percent:.0} ± {error:.0} % of it for a \
+             standard deviation, log odds {log_odds:.1})"
+        )
+    })
+}
 
 /// A set on trial at its own noise.
 pub fn tried(scene: &Scene, library: &Library, weighed: &Weighed) -> Tried {

@@ -43,8 +43,44 @@ pub enum Assembled<'a> {
     Broken(Placement, &'a [u8]),
 }
 
-/// The frames of a channel by their count; None once nothing of a frame waits for its neighbours any more, which is soon so of most.
-type Edges = BTreeMap<u32, Option<Box<Edge>>>;
+/// The frames of a channel by their count.
+#[derive(Default)]
+struct Edges {
+    /// None once nothing of a frame waits for its neighbours any more, which is soon so of most.
+    by_count: BTreeMap<u32, Option<Box<Edge>>>,
+    idle: IdleRuns,
+}
+
+/// Frames of nothing but idle data, which a packet passes over: stretches of them by their first and by their last count, so that hours of
+/// them are one step.
+#[derive(Default)]
+struct IdleRuns {
+    last_by_first: HashMap<u32, u32>,
+    first_by_last: HashMap<u32, u32>,
+}
+
+impl IdleRuns {
+    /// Takes one more; the first of its stretch.
+    fn take(&mut self, count: u32) -> u32 {
+        let first = self.first_by_last.remove(&count.wrapping_sub(1)).unwrap_or(count);
+        let last = self.last_by_first.remove(&count.wrapping_add(1)).unwrap_or(count);
+        self.last_by_first.insert(first, last);
+        self.first_by_last.insert(last, first);
+        first
+    }
+
+    /// The count before, stretches passed over.
+    fn before(&self, count: u32) -> u32 {
+        let at = count.wrapping_sub(1);
+        self.first_by_last.get(&at).map_or(at, |first| first.wrapping_sub(1))
+    }
+
+    /// The count after, stretches passed over.
+    fn after(&self, count: u32) -> u32 {
+        let at = count.wrapping_add(1);
+        self.last_by_first.get(&at).map_or(at, |last| last.wrapping_add(1))
+    }
+}
 
 /// Joins packets over frame borders.
 #[derive(Default)]
@@ -52,17 +88,16 @@ pub struct Assembler {
     channels: HashMap<u8, Edges>,
 }
 
-/// More frames than this no packet runs over: the longest packet in frames that hold one octet of data each would.
-const SPAN_FRAMES_MAX: u32 = PACKET_OCTETS_MAX as u32;
-
 impl Assembler {
     /// Takes one frame (each identity once) and hands on every packet that it completes.
     pub fn take(&mut self, frame: &TransferFrame<'_>, mut hand_on: impl FnMut(Assembled<'_>)) {
         let edge = walk(frame, &mut hand_on);
         let (continues, opens) = (edge.passes_on || !edge.head.is_empty(), edge.tail.is_some());
         let edges = self.channels.entry(frame.id.channel).or_default();
-        edges.insert(frame.id.count, edge.waits().then(|| Box::new(edge)));
-        if continues && let Some(start) = start_of_packet_into(edges, frame.id.count) {
+        edges.by_count.insert(frame.id.count, edge.waits().then(|| Box::new(edge)));
+        let count = frame.id.count;
+        let begins = if frame.first_header == IDLE_DATA_ONLY { edges.idle.take(count) } else { count };
+        if continues && let Some(start) = start_of_packet_into(edges, begins) {
             complete(edges, FrameId { count: start, ..frame.id }, &mut hand_on);
         }
         if opens {
@@ -72,7 +107,7 @@ impl Assembler {
 
     /// Frames held, of every channel.
     pub fn frames(&self) -> usize {
-        self.channels.values().map(BTreeMap::len).sum()
+        self.channels.values().map(|edges| edges.by_count.len()).sum()
     }
 }
 
@@ -94,30 +129,32 @@ fn walk(frame: &TransferFrame<'_>, hand_on: &mut impl FnMut(Assembled<'_>)) -> E
     Edge { head: head.into(), passes_on: false, tail: (!rest.is_empty()).then(|| rest.into()) }
 }
 
-/// The frame with the unfinished packet that the head of frame `count` continues, if everything between is there.
+/// The frame with the unfinished packet that frame `count` continues, if everything between is there.
 fn start_of_packet_into(edges: &Edges, count: u32) -> Option<u32> {
     let mut at = count;
-    for _ in 0..SPAN_FRAMES_MAX {
-        at = at.wrapping_sub(1);
-        let edge = edges.get(&at)?.as_deref()?;
+    let mut octets = 0;
+    while octets <= PACKET_OCTETS_MAX {
+        at = edges.idle.before(at);
+        let edge = edges.by_count.get(&at)?.as_deref()?;
         if edge.tail.is_some() {
             return Some(at);
         }
         if !edge.passes_on {
             return None;
         }
+        octets += edge.head.len();
     }
     None
 }
 
 /// Hands on the packet that starts at the end of frame `first`, when the frames it runs over are there.
 fn complete(edges: &mut Edges, first: FrameId, hand_on: &mut impl FnMut(Assembled<'_>)) {
-    let tail = edges.get(&first.count).and_then(|edge| edge.as_ref()?.tail.as_ref());
+    let tail = edges.by_count.get(&first.count).and_then(|edge| edge.as_ref()?.tail.as_ref());
     let Some(mut octets) = tail.map(|tail| tail.to_vec()) else { return };
     let mut last = first;
     let whole = loop {
-        last.count = last.count.wrapping_add(1);
-        let Some(edge) = edges.get(&last.count) else { return };
+        last.count = edges.idle.after(last.count);
+        let Some(edge) = edges.by_count.get(&last.count) else { return };
         let (head, passes_on) = edge.as_ref().map_or((&[][..], false), |edge| (&edge.head, edge.passes_on));
         octets.extend_from_slice(head);
         let total = packet::total_octets(&octets);
@@ -138,7 +175,7 @@ fn complete(edges: &mut Edges, first: FrameId, hand_on: &mut impl FnMut(Assemble
 /// Frees what a settled packet held.
 fn forget(edges: &mut Edges, placement: Placement) {
     let mut free = |count: u32, part: fn(&mut Edge)| {
-        let Some(place) = edges.get_mut(&count) else { return };
+        let Some(place) = edges.by_count.get_mut(&count) else { return };
         if let Some(edge) = place {
             part(edge);
         }
@@ -220,6 +257,27 @@ mod tests {
         }
         let backwards: Vec<_> = frames.iter().rev().cloned().collect();
         assert_eq!(assemble(&backwards), packets);
+    }
+
+    /// A packet cut by hours of idle data goes on behind them, in whatever order the frames come; and each idle frame is one step.
+    #[test]
+    fn a_packet_goes_on_behind_any_number_of_idle_frames() {
+        const IDLE: u32 = 200_000;
+        let id = PacketId { apid: Apid::EVT, clock: Clock::from_tenths(7), sequence: 1 };
+        let packet = write(id, &[9; 58]);
+        let frame = |count, first_header, data: &[u8]| {
+            frame::write(&LINK, FrameId { channel: 1, count }, 0, first_header, data)
+        };
+        let rest = [&packet[40..], &write_idle(0, 80 - packet.len())].concat();
+        let mut frames = vec![frame(0, 0, &packet[..40])];
+        frames.extend((1..=IDLE).map(|count| frame(count, IDLE_DATA_ONLY, &[0; 40])));
+        frames.push(frame(IDLE + 1, (packet.len() - 40) as u16, &rest));
+        assert_eq!(assemble(&frames), [&packet[..]]);
+        frames.reverse();
+        assert_eq!(assemble(&frames), [&packet[..]]);
+        let (even, odd): (Vec<_>, Vec<_>) = frames.into_iter().enumerate().partition(|(i, _)| i % 2 == 0);
+        let apart: Vec<Vec<u8>> = even.into_iter().chain(odd).map(|(_, frame)| frame).collect();
+        assert_eq!(assemble(&apart), [&packet[..]]);
     }
 
     #[test]
