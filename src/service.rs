@@ -1,6 +1,7 @@
 //! The service, wired together from start to drain: ports, raw log, station, hub, API, recording.
 
 pub mod diagnosing;
+mod http;
 
 use std::io;
 use std::net::SocketAddr;
@@ -79,7 +80,7 @@ pub struct Service {
     listening: JoinHandle<()>,
     writing: JoinHandle<Result<(), StoreError>>,
     recording: Option<(CancellationToken, JoinHandle<Result<(), RecordError>>)>,
-    serving: JoinHandle<io::Result<()>>,
+    serving: JoinHandle<()>,
     diagnosing: Option<(DropGuard, JoinHandle<()>)>,
     drain_timeout: Duration,
 }
@@ -135,7 +136,7 @@ impl Service {
             closing: closing.clone(),
             metrics: Metrics::default(),
         });
-        let serving = tokio::spawn(serve(http, app, closing.clone()));
+        let serving = tokio::spawn(http::serve(http, api::router(app), closing.clone()));
         let writer = {
             let (log, station, hub, board) = (log.clone(), station.clone(), hub.clone(), board.clone());
             blocking(move || Writer::restore(log, station, hub, board)).await??
@@ -220,7 +221,7 @@ impl Service {
         };
         self.closing.cancel();
         match tokio::time::timeout(HTTP_PATIENCE, self.serving).await {
-            Ok(served) => joined(served)?.map_err(ServiceError::Http)?,
+            Ok(served) => joined(served)?,
             Err(_) => tracing::warn!("some HTTP clients did not end in time"),
         }
         written?;
@@ -241,10 +242,6 @@ fn checked(config: &Config) -> Result<Option<Expectation>, ConfigFaults> {
             Err(ConfigFaults(faults))
         }
     }
-}
-
-async fn serve(listener: TcpListener, app: Arc<App>, closing: CancellationToken) -> io::Result<()> {
-    axum::serve(listener, api::router(app)).with_graceful_shutdown(closing.cancelled_owned()).await
 }
 
 fn start_recording(

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::{Query, State};
+use axum::extract::State;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use super::App;
 use super::problem::Problem;
-use super::query::optional_clock;
+use super::query::{Asked, optional_clock};
 use crate::hub::wire::{self, BodyAxes, Gap, Time};
 use crate::pipeline::Product;
 use crate::units::Clock;
@@ -126,7 +126,7 @@ const POINTS_MAX: usize = 100_000;
 /// Body-axis acceleration over a span: min, mean and max in buckets.
 #[utoipa::path(get, path = "/accel/history", tag = "acceleration", params(Span),
     responses((status = 200, body = History), (status = 400, description = "a parameter makes no sense")))]
-pub async fn history(State(app): State<Arc<App>>, Query(span): Query<Span>) -> Result<Json<History>, Problem> {
+pub async fn history(State(app): State<Arc<App>>, Asked(span): Asked<Span>) -> Result<Json<History>, Problem> {
     let from = optional_clock(&app.mission, "from", span.from.as_deref())?;
     let to = optional_clock(&app.mission, "to", span.to.as_deref())?;
     let points = points(span.max_points.as_deref())?;

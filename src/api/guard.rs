@@ -1,8 +1,9 @@
 //! What every request passes: its size, and its token where one is configured.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use axum::extract::{Request, State};
+use axum::extract::{Query, Request, State};
 use axum::http::header::{AUTHORIZATION, CONTENT_LENGTH, WWW_AUTHENTICATE};
 use axum::http::{HeaderValue, StatusCode};
 use axum::middleware::Next;
@@ -41,7 +42,7 @@ fn refuse(app: &App, request: &Request) -> Option<Response> {
         return Some(Problem::new(StatusCode::PAYLOAD_TOO_LARGE, detail).into_response());
     }
     let token = app.token.as_ref()?;
-    if OPEN_PATHS.contains(&request.uri().path()) || presented(request).is_some_and(|found| same(&found, token)) {
+    if OPEN_PATHS.contains(&request.uri().path()) || presented(request).iter().any(|found| same(found, token)) {
         return None;
     }
     let detail = "this service needs its token: Authorization: Bearer TOKEN, or ?access_token=TOKEN";
@@ -50,14 +51,18 @@ fn refuse(app: &App, request: &Request) -> Option<Response> {
     Some(response)
 }
 
-/// The token of a request: in its header, or in its query where a browser cannot set one.
-fn presented(request: &Request) -> Option<String> {
+/// The token of a request: in its header, or in its query where a browser cannot set one, there as it stands or percent-encoded.
+fn presented(request: &Request) -> Vec<String> {
     if let Some(value) = request.headers().get(AUTHORIZATION) {
-        let (scheme, token) = value.to_str().ok()?.split_once(' ')?;
-        return scheme.eq_ignore_ascii_case("bearer").then(|| token.trim().to_string());
+        let bearer = value.to_str().ok().and_then(|value| value.split_once(' '));
+        let token = bearer.filter(|(scheme, _)| scheme.eq_ignore_ascii_case("bearer"));
+        return token.map(|(_, token)| token.trim().to_string()).into_iter().collect();
     }
-    let query = request.uri().query()?;
-    query.split('&').find_map(|pair| pair.strip_prefix("access_token=")).map(str::to_string)
+    let query = request.uri().query().unwrap_or_default();
+    let Some(written) = query.split('&').find_map(|pair| pair.strip_prefix("access_token=")) else { return Vec::new() };
+    let decoded = Query::<HashMap<String, String>>::try_from_uri(request.uri()).ok();
+    let decoded = decoded.and_then(|Query(mut parameters)| parameters.remove("access_token"));
+    [Some(written.to_string()), decoded].into_iter().flatten().collect()
 }
 
 /// Compares digests, so that the time taken says nothing about the token.

@@ -3,18 +3,19 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::extract::State;
 use axum::extract::ws::{CloseFrame, Message as Frame, Utf8Bytes, WebSocket, WebSocketUpgrade, close_code};
-use axum::extract::{Query, State};
 use axum::http::StatusCode;
 use axum::response::Response;
 use bytes::Bytes;
-use futures_util::{SinkExt, StreamExt, stream::SplitSink};
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{FutureExt, SinkExt, StreamExt};
 use serde::Deserialize;
 use utoipa::IntoParams;
 
 use super::App;
 use super::problem::Problem;
-use super::query::clock;
+use super::query::{Asked, clock};
 use crate::hub::status::count;
 use crate::hub::wire::message_members;
 use crate::hub::{Message, Step, Topic, Topics};
@@ -24,6 +25,8 @@ use crate::units::Clock;
 const AT_ONCE: usize = 256;
 /// A client that takes nothing for this long is gone.
 const WRITE_PATIENCE: Duration = Duration::from_secs(60);
+/// The answer to a client that goes is written within this time.
+const CLOSE_PATIENCE: Duration = Duration::from_secs(5);
 /// A ping goes out after this much silence.
 const PING_EVERY: Duration = Duration::from_secs(20);
 /// A client sends nothing but pongs; larger messages end the connection.
@@ -51,7 +54,7 @@ enum From {
     responses((status = 101, description = "one JSON object a message: seq, prev, type, ..."), (status = 400, description = "a parameter makes no sense")))]
 pub async fn live(
     State(app): State<Arc<App>>,
-    Query(wish): Query<Wish>,
+    Asked(wish): Asked<Wish>,
     upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
 ) -> Result<Response, Problem> {
     let words = wish.topics.as_deref().unwrap_or("window");
@@ -125,20 +128,21 @@ async fn serve(app: &Arc<App>, socket: WebSocket, from: From, topics: Topics) ->
                 break;
             }
             client.send(&messages).await?;
+            client.hear_what_is_there(&mut incoming).await?;
         }
     }
     let mut reader = app.hub.reader(topics, after, Some(app.live_behind_max));
     let mut ping = tokio::time::interval(PING_EVERY);
     loop {
         match off_the_runtime(topics, || reader.next(AT_ONCE)) {
-            Some(Step::Messages(messages)) => client.send(&messages).await?,
+            Some(Step::Messages(messages)) => {
+                client.send(&messages).await?;
+                client.hear_what_is_there(&mut incoming).await?;
+            }
             Some(Step::Lag { from_seq, to_seq, count }) => client.lag(from_seq, to_seq, count).await?,
             None => tokio::select! {
                 there = reader.wait() => if !there { return client.close().await },
-                frame = incoming.next() => match frame {
-                    Some(Ok(Frame::Close(_)) | Err(_)) | None => return Ok(()),
-                    Some(Ok(_)) => {}
-                },
+                frame = incoming.next() => client.hear(frame).await?,
                 _ = ping.tick() => client.write([Frame::Ping(Bytes::new())]).await?,
                 () = app.closing.cancelled() => return client.close().await,
             },
@@ -151,7 +155,42 @@ fn off_the_runtime<T>(topics: Topics, read: impl FnOnce() -> T) -> T {
     if topics.has(Topic::Raw) { tokio::task::block_in_place(read) } else { read() }
 }
 
+/// Why a connection ends of which nothing more can be understood, from what the reader of its frames says.
+fn fault_code(sentence: &str) -> u16 {
+    match sentence {
+        long if long.contains("too long") || long.contains("too big") => close_code::SIZE,
+        text if text.to_ascii_lowercase().contains("utf-8") => close_code::INVALID,
+        _ => close_code::PROTOCOL,
+    }
+}
+
 impl Client<'_> {
+    /// Takes what a client says: nothing but that it goes is of interest, and that is answered.
+    async fn hear(&mut self, frame: Option<Result<Frame, axum::Error>>) -> Result<(), Gone> {
+        match frame {
+            Some(Ok(Frame::Close(_))) => {
+                let _ = tokio::time::timeout(CLOSE_PATIENCE, self.socket.close()).await;
+                Err(Gone)
+            }
+            Some(Ok(_)) => Ok(()),
+            Some(Err(error)) => {
+                let code = fault_code(&error.to_string());
+                let farewell = Frame::Close(Some(CloseFrame { code, reason: Utf8Bytes::default() }));
+                let _ = tokio::time::timeout(CLOSE_PATIENCE, self.socket.send(farewell)).await;
+                Err(Gone)
+            }
+            None => Err(Gone),
+        }
+    }
+
+    /// Takes what the client has said while it was written to, without waiting for more.
+    async fn hear_what_is_there(&mut self, incoming: &mut SplitStream<WebSocket>) -> Result<(), Gone> {
+        while let Some(frame) = incoming.next().now_or_never() {
+            self.hear(frame).await?;
+        }
+        Ok(())
+    }
+
     async fn hello(&mut self, from: From, after: u64) -> Result<(), Gone> {
         let from = match from {
             From::Now => "now".into(),

@@ -1,12 +1,27 @@
-//! Times in queries: clock seconds or RFC 3339.
+//! Queries, and the times in them: clock seconds or RFC 3339.
 
+use axum::extract::{FromRequestParts, Query};
+use axum::http::request::Parts;
 use jiff::Timestamp;
+use serde::de::DeserializeOwned;
 
 use super::problem::Problem;
 use crate::units::{Clock, MissionTime};
 
 /// Clocks beyond this are no times of a mission: a CUC time has 32 bits of seconds.
 const CLOCK_S_MAX: f64 = 4_294_967_296.0;
+
+/// The parameters of a query; what they cannot be is a problem as any other.
+pub struct Asked<T>(pub T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Asked<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let read = Query::from_request_parts(parts, state).await;
+        read.map(|Query(asked)| Self(asked)).map_err(|rejection| Problem::bad_request(rejection.body_text()))
+    }
+}
 
 /// Reads a time; which parameter it is of stands in the sentence when it is none.
 ///

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::{Query, State};
+use axum::extract::State;
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -12,7 +12,7 @@ use utoipa::{IntoParams, ToSchema};
 
 use super::App;
 use super::problem::Problem;
-use super::query::optional_clock;
+use super::query::{Asked, optional_clock};
 use crate::hub::wire::{AnomalyWire, EventWire, Gap};
 use crate::pipeline::Station;
 use crate::pipeline::files::{ledger_json, version_json};
@@ -36,7 +36,7 @@ async fn ask<T: Send + 'static>(app: &Arc<App>, question: impl FnOnce(&Station) 
 #[utoipa::path(get, path = "/calibration", tag = "calibration", params(AsOf),
     responses((status = 200, description = "one version of the calibration", body = Object),
         (status = 404, description = "none was known")))]
-pub async fn calibration(State(app): State<Arc<App>>, Query(query): Query<AsOf>) -> Result<Json<Value>, Problem> {
+pub async fn calibration(State(app): State<Arc<App>>, Asked(query): Asked<AsOf>) -> Result<Json<Value>, Problem> {
     let as_of = optional_clock(&app.mission, "as_of", query.as_of.as_deref())?;
     let found = ask(&app, move |station| match as_of {
         None => station.calibration().map(version_json),
@@ -51,7 +51,7 @@ pub async fn calibration(State(app): State<Arc<App>>, Query(query): Query<AsOf>)
     responses((status = 200, description = "versions of the calibration", body = Object)))]
 pub async fn calibration_history(
     State(app): State<Arc<App>>,
-    Query(query): Query<AsOf>,
+    Asked(query): Asked<AsOf>,
 ) -> Result<Json<Value>, Problem> {
     let as_of = optional_clock(&app.mission, "as_of", query.as_of.as_deref())?;
     let versions = ask(&app, move |station| {

@@ -22,7 +22,7 @@ use crate::hub::status::{Phase, counted};
 pub struct Status {
     /// `replaying`, `running`, `stuck` or `draining`.
     pub phase: &'static str,
-    /// Why it is stuck.
+    /// Why it is stuck; or why nothing is recorded, where the rest goes on.
     pub trouble: Option<String>,
     /// Version of the program.
     pub version: &'static str,
@@ -120,7 +120,11 @@ pub async fn status(State(app): State<Arc<App>>) -> Json<Status> {
     let phase = app.board.phase();
     Json(Status {
         phase: phase_word(&phase),
-        trouble: if let Phase::Stuck(sentence) = &phase { Some(sentence.clone()) } else { None },
+        trouble: if let Phase::Stuck(sentence) = &phase {
+            Some(sentence.clone())
+        } else {
+            app.board.recording_trouble()
+        },
         version: env!("CARGO_PKG_VERSION"),
         mission: app.hub.mission().into(),
         spacecraft_id: app.hub.spacecraft_id(),
@@ -233,6 +237,7 @@ fn note(app: &App) {
     counter!("oare_connections_idle_total").absolute(counted(&counters.connections_idle));
     counter!("oare_batches_total").absolute(counted(&counters.batches));
     counter!("oare_store_faults_total").absolute(counted(&counters.store_faults));
+    counter!("oare_recording_faults_total").absolute(counted(&counters.recording_faults));
     counter!("oare_live_delivered_total").absolute(counted(&counters.live_delivered));
     counter!("oare_live_lagged_total").absolute(counted(&counters.live_lagged));
     counter!("oare_recorded_total").absolute(counted(&counters.recorded));

@@ -68,8 +68,10 @@ pub struct Counters {
     pub live_delivered: AtomicU64,
     /// Messages they were told they missed.
     pub live_lagged: AtomicU64,
-    /// Messages in recordings.
+    /// Messages in recordings; what is written anew counts again.
     pub recorded: AtomicU64,
+    /// Times a recording could not be written.
+    pub recording_faults: AtomicU64,
 }
 
 /// Adds to a counter.
@@ -100,13 +102,19 @@ pub enum Phase {
 pub struct Board {
     picture: RwLock<Arc<Picture>>,
     phase: RwLock<Phase>,
+    recording: RwLock<Option<String>>,
     /// Counted while it happens.
     pub counters: Counters,
 }
 
 impl Default for Board {
     fn default() -> Self {
-        Self { picture: RwLock::default(), phase: RwLock::new(Phase::Replaying), counters: Counters::default() }
+        Self {
+            picture: RwLock::default(),
+            phase: RwLock::new(Phase::Replaying),
+            recording: RwLock::default(),
+            counters: Counters::default(),
+        }
     }
 }
 
@@ -124,6 +132,16 @@ impl Board {
     /// Where the service is in its life.
     pub fn phase(&self) -> Phase {
         self.phase.read().expect("no holder panics").clone()
+    }
+
+    /// Why there is no recording of what comes in, while there is none.
+    pub fn recording_trouble(&self) -> Option<String> {
+        self.recording.read().expect("no holder panics").clone()
+    }
+
+    /// Takes over whether recordings can be written.
+    pub fn tell_of_recording(&self, trouble: Option<String>) {
+        *self.recording.write().expect("no holder panics") = trouble;
     }
 
     /// Enters a phase.

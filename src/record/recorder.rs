@@ -23,6 +23,8 @@ use crate::pipeline::Settings;
 const FILE_OCTETS_MAX: u64 = 512 << 20;
 /// How often it is looked whether there is more.
 const TICK: Duration = Duration::from_millis(50);
+/// What could not be written is tried again after so long.
+const RETRY: Duration = Duration::from_secs(5);
 /// Products are taken up this often: at full speed a window is revised several times a second, and its newest revision is enough.
 const PRODUCTS_EVERY: Duration = Duration::from_secs(1);
 /// Messages taken from the hub at once.
@@ -45,10 +47,18 @@ pub struct Recorder {
     directory: PathBuf,
     settings: Settings,
     log: Arc<RawLog>,
+    hub: Arc<Hub>,
     reader: Reader,
     board: Arc<Board>,
     at: Position,
+    /// Where it broke off last, until it is past that.
+    broke_off: Option<Position>,
     open: Option<Open>,
+}
+
+/// A reader of what a recording has of the hub.
+fn reader_after(hub: &Arc<Hub>, seq: u64) -> Reader {
+    hub.reader(Topics::ALL.without(Topic::Raw), seq, None).newest_only()
 }
 
 impl Recorder {
@@ -74,16 +84,41 @@ impl Recorder {
             }
             at = path.file_name().and_then(|name| end_of(name.to_str()?)).map_or(at, |end| at.max(end));
         }
-        let topics = Topics::ALL.without(Topic::Raw);
-        let reader = hub.reader(topics, at.seq, None).newest_only();
-        Ok(Self { directory, settings: settings.clone(), log, reader, board, at, open: None })
+        let reader = reader_after(&hub, at.seq);
+        Ok(Self { directory, settings: settings.clone(), log, hub, reader, board, at, broke_off: None, open: None })
     }
 
-    /// Records until told to finish, and then what is left.
+    /// Records until told to finish, and then what is left. What could not be written is written anew as soon as it can be; until then
+    /// the board says so.
     ///
     /// # Errors
-    /// When a file cannot be written or the raw log cannot be read. The service goes on without a recording then, and says so.
+    /// When what is left at the end cannot be written.
     pub fn run(mut self, runtime: &Handle, finish: &CancellationToken) -> Result<(), RecordError> {
+        loop {
+            let Err(error) = self.record(runtime, finish) else { return Ok(()) };
+            tracing::warn!(%error, "the recording broke off; it is written anew from where the last whole one ends");
+            count(&self.board.counters.recording_faults, 1);
+            self.board.tell_of_recording(Some(error.to_string()));
+            self.begin_anew();
+            if finish.is_cancelled() {
+                return Err(error);
+            }
+            let _ = runtime.block_on(async { tokio::time::timeout(RETRY, finish.cancelled()).await });
+        }
+    }
+
+    /// Drops the file that could not be written, and goes back to where it began.
+    fn begin_anew(&mut self) {
+        self.broke_off = self.broke_off.max(Some(self.at));
+        if let Some(Open { from, .. }) = self.open.take() {
+            self.at = from;
+        }
+        let _ = fs::remove_file(self.part_path());
+        self.reader = reader_after(&self.hub, self.at.seq);
+    }
+
+    /// The same until something cannot be written or read.
+    fn record(&mut self, runtime: &Handle, finish: &CancellationToken) -> Result<(), RecordError> {
         let mut products_read = Instant::now();
         loop {
             let finishing = finish.is_cancelled();
@@ -94,6 +129,10 @@ impl Recorder {
             if finishing || products_read.elapsed() > PRODUCTS_EVERY {
                 while self.messages()? {}
                 products_read = Instant::now();
+                if self.broke_off.is_some_and(|at| self.at >= at) {
+                    self.broke_off = None;
+                    self.board.tell_of_recording(None);
+                }
             }
             if finishing {
                 return self.finish_file();

@@ -94,12 +94,27 @@ async fn a_configured_token_is_needed_everywhere_but_for_health() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_token_in_a_query_may_stand_as_it_is_or_encoded() {
+    let running = start_with(|config| config.http.token = Some("aGVsbG8gd29ybGQ+/3c=".into())).await;
+    for (token, status) in
+        [("aGVsbG8gd29ybGQ+/3c=", 200), ("aGVsbG8gd29ybGQ%2B%2F3c%3D", 200), ("aGVsbG8gd29ybGQ%20%2F3c%3D", 401)]
+    {
+        let answer = reqwest::get(running.url(&format!("/status?access_token={token}"))).await.unwrap();
+        assert_eq!(answer.status(), status, "{token}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn parameters_that_make_no_sense_are_named() {
     let running = start().await;
     let cases = [
         ("/accel/history?from=soon", "soon"),
         ("/accel/history?from=10&to=5", "after"),
         ("/accel/history?max_points=0", "max_points"),
+        ("/accel/history?max_points=many", "max_points"),
+        ("/accel/history?from=1&from=2", "`from`"),
+        ("/accel/live?from=1&from=2", "`from`"),
+        ("/calibration?as_of=1&as_of=2", "`as_of`"),
         ("/calibration?as_of=1994-13-01", "as_of"),
         ("/accel/live?topics=weather", "weather"),
         ("/accel/live?from=seq:x", "seq:x"),

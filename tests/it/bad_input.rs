@@ -209,6 +209,47 @@ async fn a_full_disk_stops_the_taking_and_loses_nothing() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_recording_that_broke_off_is_told_and_written_anew() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(disk) = SmallDisk::mount(&dir.path().join("recordings"), "64k") else { return };
+    let mut config = config(&dir);
+    config.recording = true;
+    let running = Running { service: Service::start(config).await.unwrap(), dir };
+    running.send(&dump(20_000, 20_000, 0)).await;
+    let told = |status: &serde_json::Value| status["trouble"].as_str().is_some_and(|s| s.contains("recording"));
+    let status = running.wait_for("trouble told", told).await;
+    assert_eq!(status["phase"], "running", "the rest goes on");
+    drop(Command::new("mount").args(["-o", "remount,size=200m"]).arg(&disk.0).output());
+    running.wait_for_playbacks(1).await;
+    running.wait_for("the trouble over", |status| status["trouble"].is_null()).await;
+    running.service.drain().await.unwrap();
+    let names: Vec<String> =
+        std::fs::read_dir(&disk.0).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    assert!(names.len() == 1 && names[0].starts_with("recording-b0-") && names[0].ends_with(".mcap"), "{names:?}");
+    drop(disk);
+}
+
+/// Whoever opens connections and says half of what he wants holds up nobody, and not for long.
+#[tokio::test(flavor = "multi_thread")]
+async fn half_a_request_is_not_waited_for_without_end() {
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    let running = start_with(|config| config.recording = false).await;
+    let mut half = Vec::new();
+    for _ in 0..300 {
+        let mut stream = tokio::net::TcpStream::connect(running.service.http_address).await.unwrap();
+        stream.write_all(b"GET /accel HTTP/1.1\r\nHost: x\r\n").await.unwrap();
+        half.push(stream);
+    }
+    running.send(&dump(20_000, 600, 0)).await;
+    running.wait_for_playbacks(1).await;
+    for mut stream in half {
+        let mut answer = Vec::new();
+        let over = tokio::time::timeout(PATIENCE, stream.read_to_end(&mut answer)).await.expect("it is closed");
+        assert!(over.is_err() || answer.is_empty() || answer.starts_with(b"HTTP/1.1 408"), "{answer:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_busy_port_is_told_with_its_address() {
     let running = start().await;
     let dir = tempfile::tempdir().unwrap();

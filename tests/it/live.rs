@@ -2,7 +2,10 @@
 
 use std::collections::BTreeSet;
 
+use futures_util::{SinkExt, StreamExt};
 use serde_json::Value;
+use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
+use tokio_tungstenite::tungstenite::{Bytes, Message};
 
 use crate::service_support::*;
 
@@ -165,4 +168,53 @@ async fn a_slow_reader_is_told_what_it_missed() {
         all,
         "told and missed are all there is"
     );
+}
+
+/// The code with which the service ends a connection, and the text messages it sent before.
+async fn farewell(live: &mut Live) -> (Option<CloseCode>, usize) {
+    let mut texts = 0;
+    loop {
+        match tokio::time::timeout(PATIENCE, live.0.next()).await.expect("the service answers") {
+            Some(Ok(Message::Close(frame))) => return (frame.map(|frame| frame.code), texts),
+            Some(Ok(Message::Text(_))) => texts += 1,
+            Some(Ok(_)) => {}
+            Some(Err(_)) | None => return (None, texts),
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_client_is_heard_while_it_catches_up_and_its_leave_is_answered() {
+    const SECONDS: usize = 9000;
+    let running = start().await;
+    running.send(&dump(20_000, SECONDS as i64, 0)).await;
+    running.wait_for_playbacks(1).await;
+
+    let mut pinging = running.live("topics=raw&from=0").await;
+    pinging.0.send(Message::Ping(Bytes::from_static(b"there?"))).await.unwrap();
+    let mut before = 0;
+    loop {
+        match tokio::time::timeout(PATIENCE, pinging.0.next()).await.unwrap().unwrap().unwrap() {
+            Message::Pong(said) => break assert_eq!(said, Bytes::from_static(b"there?")),
+            _ => before += 1,
+        }
+    }
+    assert!(before < SECONDS, "the ping is answered after all {before} messages");
+
+    let mut leaving = running.live("topics=raw&from=0").await;
+    leaving.0.close(None).await.unwrap();
+    // It stops sending, answers, and the connection is over.
+    let (_, texts) = farewell(&mut leaving).await;
+    assert!(texts < SECONDS, "all {texts} messages are sent to one that left");
+
+    let mut quiet = running.live("topics=window").await;
+    quiet.next().await.unwrap();
+    quiet.0.close(None).await.unwrap();
+    let answered = tokio::time::timeout(PATIENCE, quiet.0.next()).await.unwrap();
+    assert!(matches!(answered, Some(Ok(Message::Close(_)))), "{answered:?}");
+
+    let mut loud = running.live("topics=window").await;
+    loud.next().await.unwrap();
+    loud.0.send(Message::text("x".repeat(10_000))).await.unwrap();
+    assert_eq!(farewell(&mut loud).await.0, Some(CloseCode::Size));
 }

@@ -135,7 +135,7 @@ pub async fn send(address: SocketAddr, octets: &[u8]) {
 }
 
 /// A WebSocket client.
-pub struct Live(tokio_tungstenite::WebSocketStream<tokio_tungstenite::MaybeTlsStream<TcpStream>>);
+pub struct Live(pub tokio_tungstenite::WebSocketStream<tokio_tungstenite::MaybeTlsStream<TcpStream>>);
 
 pub async fn live(url: &str) -> Live {
     let (socket, _) = tokio_tungstenite::connect_async(url).await.unwrap();

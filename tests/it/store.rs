@@ -265,6 +265,10 @@ async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, within_s: f64, seed: u6
     program
         .wait_until(|status| status["ingest"]["playbacks_open"] == 0 && status["ingest"]["connections_open"] == 0)
         .await;
+    // The numbers jump at every kill; nothing is missed for that.
+    let mut live = live(&format!("ws://{}/accel/live?topics=window&from=seq:0", program.http)).await;
+    assert_eq!(live.next().await.unwrap()["type"], "hello");
+    assert_eq!(live.next().await.unwrap()["type"], "window");
     program.kill();
     let settings = Config::standard().settings;
     let log = RawLog::open(dir.path(), &settings.mission, settings.link.spacecraft_id).unwrap();
