@@ -4,7 +4,8 @@
 //! The fitted series of every member is tried times each of what it might follow, one coefficient each, beside the set.
 
 use super::case::HALF_WINDOW_S;
-use super::design::{Chosen, Frame, Raw};
+use super::catalogue::Shape;
+use super::design::{Chosen, Column, Frame, Raw};
 use super::measure::coverage;
 use super::open_form::orbit_angles;
 use super::scene::{Axes, Scene};
@@ -52,7 +53,12 @@ pub fn follows_most(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) 
         }
         let kind = kind_of(effect.id);
         let tried = covariates.iter().filter(|c| c.of_kind.is_none() || c.of_kind == kind);
-        let found: Vec<Follows> = tried.filter_map(|c| of_one(frame, &chosen, member, series, c)).collect();
+        let (tried, changed): (Vec<&Covariate>, Vec<Raw>) =
+            tried.filter_map(|c| Some((c, changed(series, c)?))).unzip();
+        let sizes = vec![SIZE; changed.len()];
+        let columns = frame.columns(&Shape::Columns(changed).on_axes(&sizes, 1.0));
+        let found: Vec<Follows> =
+            tried.iter().zip(columns).map(|(c, column)| of_one(&chosen, member, c, column)).collect();
         let best = found.iter().max_by(|a, b| a.log_odds.total_cmp(&b.log_odds))?.clone();
         let sum: f64 = found.iter().map(|f| (f.log_odds - best.log_odds).exp()).sum();
         Some(Follows { log_odds: best.log_odds + (sum / found.len() as f64).ln() + LOG_PRIOR, ..best })
@@ -60,19 +66,23 @@ pub fn follows_most(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) 
     contributions.iter().enumerate().filter_map(of_member).max_by(|a, b| a.log_odds.total_cmp(&b.log_odds))
 }
 
-/// One covariate for one member: `log_odds` are the evidence alone.
-fn of_one(frame: &Frame, chosen: &Chosen, member: usize, series: &Axes, c: &Covariate) -> Option<Follows> {
+/// The series of a member times a covariate; none where that hardly changes.
+fn changed(series: &Axes, c: &Covariate) -> Option<Raw> {
     let relative = about_itself(series, &c.series)?;
-    let changed: Raw = series.each_ref().map(|axis| Some(axis.iter().zip(&relative).map(|(x, r)| x * r).collect()));
-    let normal = chosen.normal(&[frame.column(&changed, SIZE)]);
+    Some(series.each_ref().map(|axis| Some(axis.iter().zip(&relative).map(|(x, r)| x * r).collect())))
+}
+
+/// One covariate for one member: `log_odds` are the evidence alone.
+fn of_one(chosen: &Chosen, member: usize, c: &Covariate, column: Column) -> Follows {
+    let normal = chosen.normal(&[column]);
     let (mean, covariance) = normal.posterior();
-    Some(Follows {
+    Follows {
         member,
         what: c.what.clone(),
         change: SIZE * mean[0],
         sigma: SIZE * covariance[(0, 0)].max(0.0).sqrt(),
         log_odds: normal.gain(1.0),
-    })
+    }
 }
 
 /// A covariate about its mean where the series of a member is, over its deviation there; none where it hardly changes.

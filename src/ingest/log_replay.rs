@@ -23,20 +23,23 @@ pub(super) fn take_log(
     mut note: impl FnMut(&mut Station, u64, &[Stored]),
 ) -> Result<(), StoreError> {
     take_once(log, station, &mut note)?;
-    set_aside(log, station, note).map(|_| ())
+    if let Some(again) = taken_again(log, station, note)? {
+        *station = again;
+    }
+    Ok(())
 }
 
-/// Takes the log again where good frames of one identity differ and one in use lost the vote; whether that was so.
-pub(super) fn set_aside(
+/// Another station that takes the log again, where good frames of one identity differ and one in use lost the vote; None where none did.
+pub(super) fn taken_again(
     log: &RawLog,
-    station: &mut Station,
+    station: &Station,
     mut note: impl FnMut(&mut Station, u64, &[Stored]),
-) -> Result<bool, StoreError> {
-    let Some(set_aside) = station.to_set_aside() else { return Ok(false) };
+) -> Result<Option<Station>, StoreError> {
+    let Some(set_aside) = station.to_set_aside() else { return Ok(None) };
     tracing::warn!("good frames of one identity differ; the log is taken again with the ones seen more often");
-    *station = Station::without(station.settings().clone(), None, set_aside);
-    take_once(log, station, &mut note)?;
-    Ok(true)
+    let mut again = Station::without(station.settings().clone(), None, set_aside);
+    take_once(log, &mut again, &mut note)?;
+    Ok(Some(again))
 }
 
 fn take_once(

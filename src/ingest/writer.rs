@@ -12,7 +12,7 @@ use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
 use super::listener::Parts;
-use super::log_replay::{Orphans, set_aside, take_entry, take_log};
+use super::log_replay::{Orphans, take_entry, take_log, taken_again};
 use super::raw_log::{Entry, Journal, JournalPart, RawLog, StoreError};
 use crate::hub::status::{Board, Phase, Picture, count};
 use crate::hub::wire::{AnomalyWire, EventWire, Gap, members};
@@ -33,6 +33,8 @@ const TICK: Duration = Duration::from_millis(50);
 const IDLE_FLUSH: Duration = Duration::from_secs(90);
 /// While more keeps coming, deriving the calibration from everything waits for so many times as long as it took last.
 const CALIBRATION_PAUSES: u32 = 8;
+/// The same of taking the log again for frames that lost a vote.
+const AGAIN_PAUSES: u32 = 8;
 /// Numbers of messages reserved with every commit: more than are ever told between two. After a crash they are left out, so that no
 /// number is given twice.
 const NUMBERS_AHEAD: u64 = 1 << 24;
@@ -70,6 +72,9 @@ pub struct Writer {
     flushed: bool,
     /// When the calibration was derived last, and how long that took.
     calibrated: Option<(Instant, Duration)>,
+    /// The same of taking the log again; and whether that waits.
+    taken_again: Option<(Instant, Duration)>,
+    aside_waits: bool,
 }
 
 impl Writer {
@@ -115,6 +120,8 @@ impl Writer {
             published: journal.batches,
             flushed: true,
             calibrated: None,
+            taken_again: None,
+            aside_waits: false,
         };
         let changes = writer.restore_hub(journal);
         let closing = orphans.closing();
@@ -166,6 +173,13 @@ impl Writer {
                         self.flush();
                     } else if self.station.read().expect("no holder panics").calibration_waits() {
                         self.bring_up();
+                    }
+                    if self.aside_waits {
+                        self.set_frames_aside(1)?;
+                        // Another station has everything to tell again, windows that are not whole too.
+                        if !self.aside_waits {
+                            self.flush();
+                        }
                     }
                     self.publish_waiting();
                     self.journal_until_durable(runtime, give_up)?;
@@ -316,7 +330,7 @@ impl Writer {
 
     /// After a batch: partial windows when a playback is over and nothing more waits, and frames that lost a vote.
     fn conclude(&mut self, batch: &[Entry], nothing_waits: bool) -> Result<(), StoreError> {
-        self.set_frames_aside()?;
+        self.set_frames_aside(AGAIN_PAUSES)?;
         let one_ended = batch.iter().any(|entry| matches!(entry, Entry::Closed { .. }));
         if nothing_waits && one_ended {
             self.flush();
@@ -324,15 +338,24 @@ impl Writer {
         Ok(())
     }
 
-    /// Two good frames of one identity differ, and the one in use lost the vote: the log is taken again without it.
-    fn set_frames_aside(&mut self) -> Result<(), StoreError> {
-        let mut station = self.station.write().expect("no holder panics");
-        if !set_aside(&self.log, &mut station, |_, _, _| {})? {
+    /// Two good frames of one identity differ, and the one in use lost the vote: the log is taken again without it, beside the station that
+    /// others ask meanwhile. While more such come that waits for `pauses` times as long as it took last.
+    fn set_frames_aside(&mut self, pauses: u32) -> Result<(), StoreError> {
+        if self.taken_again.is_some_and(|(when, took)| when.elapsed() < took * pauses) {
+            self.aside_waits = self.station.read().expect("no holder panics").to_set_aside().is_some();
             return Ok(());
         }
-        let changes = station.settle();
-        station.announce_raw(true);
-        drop(station);
+        self.aside_waits = false;
+        let start = Instant::now();
+        let again = {
+            let station = self.station.read().expect("no holder panics");
+            taken_again(&self.log, &station, |_, _, _| {})?
+        };
+        let Some(mut again) = again else { return Ok(()) };
+        let changes = again.settle();
+        again.announce_raw(true);
+        *self.station.write().expect("no holder panics") = again;
+        self.taken_again = Some((Instant::now(), start.elapsed()));
         self.publish_untold(changes);
         Ok(())
     }
@@ -374,7 +397,8 @@ impl Writer {
 
     fn show(&self) {
         let station = self.station.read().expect("no holder panics");
-        self.board.show(picture(&station));
+        let picture = picture(&station);
+        self.board.show(Picture { settled: picture.settled && !self.aside_waits, ..picture });
     }
 }
 

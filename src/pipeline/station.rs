@@ -169,7 +169,7 @@ impl Station {
             Novelty::Repeated | Novelty::Conflicting => playback.account.frames_repeated += 1,
         }
         if novelty == Novelty::Conflicting {
-            self.ledger.frame_conflicts = self.frames.conflicts().count() as u64;
+            self.ledger.frame_conflicts = self.frames.conflicts() as u64;
         }
         if usable && let Ok(frame) = TransferFrame::read(&self.settings.link, &arrival.octets) {
             self.read_packets(id, &frame);

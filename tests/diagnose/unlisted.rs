@@ -143,3 +143,19 @@ fn what_only_a_thruster_still_warm_does_is_no_residual_of_every_firing() {
     };
     is_unlisted(&with(warm, [0.6, 0.6, -0.3]), "thruster lasts, exp(-(pause before it)/");
 }
+
+/// It pushes as a firing does, and harder from one to the next.
+#[test]
+fn a_push_that_grows_is_no_residual_of_every_firing() {
+    let growing = |case: &Case| {
+        let firings = case.spans("thruster");
+        let inside = |t: f64, [a, b]: [f64; 2]| ((t + 25.0).min(b) - (t - 25.0).max(a)).max(0.0) / 50.0;
+        let share = |n: usize| n as f64 / firings.len() as f64;
+        let push = |t: &f64| firings.iter().enumerate().map(|(n, span)| share(n) * inside(*t, *span)).sum();
+        case.recording.clock_s.iter().map(push).collect()
+    };
+    let found = diagnose(&with(growing, [0.7, 0.6, -0.4]), &Settings::default()).unwrap();
+    assert_eq!(found.verdict, Verdict::Unexplained, "{:?}", super::ids(&found));
+    let told = found.hypothesis.unwrap().location;
+    assert!(told.contains("the size of thruster_residual is not the same throughout, but follows the time"), "{told}");
+}

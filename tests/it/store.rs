@@ -275,6 +275,21 @@ async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, within_s: f64, seed: u6
     assert_eq!(products(&rebuild(&log, &settings).unwrap()), expected);
 }
 
+/// Frames of one identity that differ by the thousand, as from an instrument that was switched on again: who comes late finds the same.
+#[tokio::test(flavor = "multi_thread")]
+async fn two_recordings_of_the_same_counts_end_as_if_taken_at_once() {
+    let dumps: Vec<Vec<u8>> = [20_000, 60_000, 100_000].map(|second| dump(second, 6000, 0)).into();
+    let running = start().await;
+    for (n, dump) in dumps.iter().enumerate() {
+        running.send(dump).await;
+        if n == 0 {
+            running.wait_for_playbacks(1).await;
+        }
+    }
+    running.wait_for_playbacks(3).await;
+    assert_eq!(running.products(), undisturbed(&dumps));
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_killed_service_has_everything_it_counted() {
     let dumps: Vec<Vec<u8>> = (0..2).map(|n| dump(20_000 + n * 9_000, 9_000, n as u32 * 10_000)).collect();
