@@ -205,8 +205,18 @@ impl Recorder {
         Ok(true)
     }
 
+    /// Finishes the file that is open. If that fails, it is as if nothing of it had been recorded.
     fn finish_file(&mut self) -> Result<(), RecordError> {
         let Some(Open { recording, from }) = self.open.take() else { return Ok(()) };
+        let finished = self.finished(recording, from);
+        if finished.is_err() {
+            self.broke_off = self.broke_off.max(Some(self.at));
+            self.at = from;
+        }
+        finished
+    }
+
+    fn finished(&self, recording: Recording<BufWriter<File>>, from: Position) -> Result<(), RecordError> {
         let part = self.part_path();
         let file = recording.finish().map_err(self.write_failed())?;
         let path = self.directory.join(name(from, self.at));
