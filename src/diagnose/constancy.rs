@@ -6,6 +6,7 @@
 use super::case::HALF_WINDOW_S;
 use super::catalogue::Shape;
 use super::design::{Chosen, Column, Frame, Raw};
+use super::instants::still_warm;
 use super::measure::coverage;
 use super::open_form::orbit_angles;
 use super::scene::{Axes, Scene};
@@ -15,8 +16,11 @@ use super::search::{Entry, Set};
 const SIZE: f64 = 0.5;
 /// Log prior odds that the size of a member follows anything at all.
 const LOG_PRIOR: f64 = -4.0;
-/// Times in which a push recovers from the one before, s.
+/// Times in which a push recovers from the one before, s: a factor of five apart, between which a decay is much the same.
 const PAUSES_S: [f64; 2] = [300.0, 1500.0];
+/// Effects that push while an entry of the log lasts, and the kind of it.
+const PUSHES: [(&str, &str); 3] =
+    [("water_dump", "water_dump"), ("evaporator_venting", "evaporator"), ("thruster_residual", "thruster")];
 
 /// A member whose size follows something.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +29,7 @@ pub struct Follows {
     pub member: usize,
     /// What its size follows, in words.
     pub what: String,
-    /// By how much of its size it changes, one standard deviation of that, and the standard error.
+    /// By how much of its size it changes for one standard deviation of that.
     pub change: f64,
     /// Standard error of `change`.
     pub sigma: f64,
@@ -51,7 +55,7 @@ pub fn follows_most(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) 
         if set.members[member].linear() == 0 {
             return None;
         }
-        let kind = kind_of(effect.id);
+        let kind = PUSHES.iter().find(|(id, _)| *id == effect.id).map(|(_, kind)| *kind);
         let tried = covariates.iter().filter(|c| c.of_kind.is_none() || c.of_kind == kind);
         let (tried, changed): (Vec<&Covariate>, Vec<Raw>) =
             tried.filter_map(|c| Some((c, changed(series, c)?))).unzip();
@@ -97,16 +101,6 @@ fn about_itself(series: &Axes, covariate: &[f64]) -> Option<Vec<f64>> {
         .then(|| covariate.iter().map(|x| (x - mean) / deviation).collect())
 }
 
-/// The entries of the log that an effect goes with.
-fn kind_of(id: &str) -> Option<&'static str> {
-    match id {
-        "water_dump" => Some("water_dump"),
-        "evaporator_venting" => Some("evaporator"),
-        "thruster_residual" => Some("thruster"),
-        _ => None,
-    }
-}
-
 fn covariates(s: &Scene) -> Vec<Covariate> {
     let clock_s = s.clock_s();
     let [start, end] = s.span_s();
@@ -134,7 +128,7 @@ fn covariates(s: &Scene) -> Vec<Covariate> {
         add(&format!("the local vertical's {axis}"), s.measure_scalar(|g| (s.body[g] * s.r_m[g].normalize())[k]));
         add(&format!("the Sun's {axis}"), s.measure_scalar(|g| (s.body[g] * s.sun[g])[k]));
     }
-    for kind in ["water_dump", "evaporator", "thruster"] {
+    for (_, kind) in PUSHES {
         of_entries(s, kind, &mut all);
     }
     all
@@ -153,11 +147,8 @@ fn of_entries(s: &Scene, kind: &'static str, all: &mut Vec<Covariate>) {
     let mut add = |what: String, series| all.push(Covariate { what, series, of_kind: Some(kind) });
     add(format!("whether the number of the {kind} is even"), at_windows(&|n| f64::from(u8::from(n % 2 == 0))));
     for pause_s in PAUSES_S {
-        let fresh = |n: usize| match n {
-            0 => 0.0,
-            n => (-(spans[n][0] - spans[n - 1][1]).max(0.0) / pause_s).exp(),
-        };
-        add(format!("the pause before the {kind}"), at_windows(&fresh));
+        let warm = still_warm(&spans, pause_s);
+        add(format!("the pause before the {kind}"), at_windows(&|n| warm[n]));
     }
 }
 

@@ -55,6 +55,13 @@ pub fn changes_of_attitude(s: &Scene) -> [Vec<f64>; 2] {
     [first.collect(), last.map(|(_, t)| *t).collect()]
 }
 
+/// How much is left at the start of each entry of what the one before had when it ended, and that dies away; nothing at the first.
+pub fn still_warm(spans: &[[f64; 2]], tau_s: f64) -> Vec<f64> {
+    let left = |pair: &[[f64; 2]]| (-(pair[1][0] - pair[0][1]).max(0.0) / tau_s).exp();
+    let none = spans.first().map(|_| 0.0);
+    none.into_iter().chain(spans.windows(2).map(left)).collect()
+}
+
 fn of_sign(all: &[(f64, f64)], sign: f64) -> Vec<f64> {
     all.iter().filter(|x| x.1 == sign).map(|x| x.0).collect()
 }

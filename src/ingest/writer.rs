@@ -72,8 +72,9 @@ pub struct Writer {
     flushed: bool,
     /// When the calibration was derived last, and how long that took.
     calibrated: Option<(Instant, Duration)>,
-    /// The same of taking the log again; and whether that waits.
+    /// The same of taking the log again.
     taken_again: Option<(Instant, Duration)>,
+    /// Frames in use have lost a vote, and the log is not taken again without them yet.
     aside_waits: bool,
 }
 
@@ -297,6 +298,7 @@ impl Writer {
     fn take(&mut self, batch: &[Entry]) {
         let mut station = self.station.write().expect("no holder panics");
         batch.iter().for_each(|entry| take_entry(&mut station, entry));
+        self.aside_waits = station.to_set_aside().is_some();
     }
 
     /// Products of what was taken, and a new calibration where one is due.
@@ -341,11 +343,10 @@ impl Writer {
     /// Two good frames of one identity differ, and the one in use lost the vote: the log is taken again without it, beside the station that
     /// others ask meanwhile. While more such come that waits for `pauses` times as long as it took last.
     fn set_frames_aside(&mut self, pauses: u32) -> Result<(), StoreError> {
-        if self.taken_again.is_some_and(|(when, took)| when.elapsed() < took * pauses) {
-            self.aside_waits = self.station.read().expect("no holder panics").to_set_aside().is_some();
+        let due = self.taken_again.is_none_or(|(when, took)| when.elapsed() >= took * pauses);
+        if !self.aside_waits || !due {
             return Ok(());
         }
-        self.aside_waits = false;
         let start = Instant::now();
         let again = {
             let station = self.station.read().expect("no holder panics");
@@ -356,7 +357,9 @@ impl Writer {
         again.announce_raw(true);
         *self.station.write().expect("no holder panics") = again;
         self.taken_again = Some((Instant::now(), start.elapsed()));
+        self.aside_waits = false;
         self.publish_untold(changes);
+        self.show();
         Ok(())
     }
 

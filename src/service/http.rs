@@ -1,4 +1,5 @@
-//! The HTTP port: connections taken, so many at once at most, each with little time to say what it wants.
+//! The HTTP port: connections taken, so many at once at most, each with little time to say what it wants; axum's own server has neither
+//! bound.
 
 use std::pin::pin;
 use std::sync::Arc;

@@ -3,7 +3,7 @@
 use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::case::Case;
-use oare_ground::diagnose::measure::window_means;
+use oare_ground::diagnose::measure::{weighted_coverage, window_means};
 use oare_ground::diagnose::{Settings, diagnose};
 
 /// Deviation of each law over the record, ng.
@@ -20,6 +20,12 @@ fn with(law: impl Fn(&Case) -> Vec<f64>, shares: [f64; 3]) -> Case {
         axis.iter_mut().zip(&law).for_each(|(x, law)| *x += SIZE_NG * share * law / deviation);
     }
     case
+}
+
+/// The simulation of one axis at the windows.
+fn simulated(case: &Case, axis: usize) -> Vec<f64> {
+    let simulation = &case.simulation;
+    window_means(&simulation.clock_s, &simulation.a_ng[axis], &case.recording.clock_s, 0.0)
 }
 
 fn is_unlisted(case: &Case, formula: &str) {
@@ -45,8 +51,7 @@ fn creep_is_no_step_and_no_drift() {
 #[test]
 fn saturation_is_no_scale_factor() {
     let lost = |case: &Case| {
-        let simulation = &case.simulation;
-        let m = window_means(&simulation.clock_s, &simulation.a_ng[1], &case.recording.clock_s, 0.0);
+        let m = simulated(case, 1);
         let mut sizes: Vec<f64> = m.iter().map(|x| x.abs()).collect();
         sizes.sort_by(f64::total_cmp);
         let level = sizes[sizes.len() * 2 / 3];
@@ -98,8 +103,7 @@ fn what_every_gap_sets_back_is_no_drift() {
 #[test]
 fn a_late_copy_of_another_axis_is_no_scale_factor_and_no_misalignment() {
     let late = |case: &Case| {
-        let simulation = &case.simulation;
-        let m = window_means(&simulation.clock_s, &simulation.a_ng[2], &case.recording.clock_s, 0.0);
+        let m = simulated(case, 2);
         let mut state = m[0];
         let mut before = case.recording.clock_s[0];
         let follow = |(t, m): (&f64, &f64)| {
@@ -136,10 +140,8 @@ fn a_thermostat_is_no_step_and_no_temperature_bias() {
 fn what_only_a_thruster_still_warm_does_is_no_residual_of_every_firing() {
     let warm = |case: &Case| {
         let firings = case.spans("thruster");
-        let weights: Vec<f64> = firings.windows(2).map(|w| (-(w[1][0] - w[0][1]).max(0.0) / 400.0).exp()).collect();
-        let inside = |t: f64, [a, b]: [f64; 2]| ((t + 25.0).min(b) - (t - 25.0).max(a)).max(0.0) / 50.0;
-        let push = |t: &f64| firings[1..].iter().zip(&weights).map(|(span, weight)| weight * inside(*t, *span)).sum();
-        case.recording.clock_s.iter().map(push).collect()
+        let warm = |w: &[[f64; 2]]| (w[1], (-(w[1][0] - w[0][1]).max(0.0) / 400.0).exp());
+        weighted_coverage(&case.recording.clock_s, firings.windows(2).map(warm))
     };
     is_unlisted(&with(warm, [0.6, 0.6, -0.3]), "thruster lasts, exp(-(pause before it)/");
 }
@@ -149,10 +151,8 @@ fn what_only_a_thruster_still_warm_does_is_no_residual_of_every_firing() {
 fn a_push_that_grows_is_no_residual_of_every_firing() {
     let growing = |case: &Case| {
         let firings = case.spans("thruster");
-        let inside = |t: f64, [a, b]: [f64; 2]| ((t + 25.0).min(b) - (t - 25.0).max(a)).max(0.0) / 50.0;
         let share = |n: usize| n as f64 / firings.len() as f64;
-        let push = |t: &f64| firings.iter().enumerate().map(|(n, span)| share(n) * inside(*t, *span)).sum();
-        case.recording.clock_s.iter().map(push).collect()
+        weighted_coverage(&case.recording.clock_s, firings.iter().enumerate().map(|(n, span)| (*span, share(n))))
     };
     let found = diagnose(&with(growing, [0.7, 0.6, -0.4]), &Settings::default()).unwrap();
     assert_eq!(found.verdict, Verdict::Unexplained, "{:?}", super::ids(&found));

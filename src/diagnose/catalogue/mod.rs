@@ -239,14 +239,7 @@ impl Shape {
             Shape::Fixed(axes) => vec![full(axes.clone())],
         }
     }
-}
 
-/// A series on one body axis, and on the next, and on the last.
-fn on_each_axis(series: &[f64]) -> impl Iterator<Item = Raw> {
-    (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| series.to_vec())))
-}
-
-impl Shape {
     /// The series of every column on the axes it acts on, of sizes times `scale`; a fixed shape is one column of size 1.
     pub fn on_axes(&self, sizes: &[f64], scale: f64) -> Vec<Vec<OnAxis<'_>>> {
         match self {
@@ -255,11 +248,11 @@ impl Shape {
                 (0..3).map(|axis| vec![OnAxis { axis, series, size: scale * sizes[axis] }]).collect()
             }
             Shape::Several(several) => {
-                let column = |(series, (axis, size))| vec![OnAxis { axis, series, size: scale * size }];
-                let sizes = sizes.chunks(3).map(|sizes| sizes.iter().copied().enumerate());
-                let of_each =
-                    several.iter().zip(sizes).flat_map(|(s, sizes)| std::iter::repeat(Stretch::of(s)).zip(sizes));
-                of_each.map(column).collect()
+                let columns = several.iter().zip(sizes.chunks(3)).flat_map(|(values, sizes)| {
+                    let series = Stretch::of(values);
+                    (0..3).map(move |axis| vec![OnAxis { axis, series, size: scale * sizes[axis] }])
+                });
+                columns.collect()
             }
             Shape::Columns(columns) => columns
                 .iter()
@@ -278,6 +271,11 @@ impl Shape {
             }
         }
     }
+}
+
+/// A series on one body axis, and on the next, and on the last.
+fn on_each_axis(series: &[f64]) -> impl Iterator<Item = Raw> {
+    (0..3).map(|k| std::array::from_fn(|j| (j == k).then(|| series.to_vec())))
 }
 
 /// A column on all three axes.

@@ -4,7 +4,7 @@ use std::ops::{Add, Mul, Sub};
 
 use super::Collector;
 use crate::diagnose::case::HALF_WINDOW_S;
-use crate::diagnose::instants::{manoeuvres, terminators};
+use crate::diagnose::instants::{manoeuvres, still_warm, terminators};
 use crate::diagnose::measure::{coverage, decay, weighted_coverage};
 use crate::diagnose::scene::Scene;
 use crate::math::robust::median;
@@ -12,6 +12,10 @@ use crate::physics::Vec3;
 
 /// Times in which what a logged event begins dies away, s: a factor of three apart, between which a decay hardly differs.
 const EVENT_TAUS_S: [f64; 4] = [200.0, 600.0, 2000.0, 6000.0];
+/// The same after a manoeuvre or a gap, which warm or cool what is large.
+pub(super) const PAUSE_TAUS_S: [f64; 4] = [300.0, 1000.0, 3000.0, 10_000.0];
+/// Times in which what is warmed, or a sensor, follows late, s.
+pub(super) const LATE_S: [f64; 3] = [1000.0, 3000.0, 10_000.0];
 
 /// Decays after instants, each forgetting the one before: exp(-(t - last)/tau).
 pub(super) fn since(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f64> {
@@ -116,7 +120,7 @@ pub(super) fn events(c: &mut Collector) {
         }
     }
     let ends: Vec<(f64, f64)> = manoeuvres(s).into_iter().filter(|x| x.1 < 0.0).map(|x| (x.0, 1.0)).collect();
-    for tau in [300.0, 1000.0, 3000.0, 10_000.0].into_iter().filter(|tau| !begins_once(s, &ends, *tau)) {
+    for tau in PAUSE_TAUS_S.into_iter().filter(|tau| !begins_once(s, &ends, *tau)) {
         c.windows(
             format!("exp(-(time since manoeuvre)/{tau:.0} s)"),
             "time_since_manoeuvre",
@@ -149,7 +153,7 @@ pub(super) fn attitude(c: &mut Collector) {
     let sun: Vec<Vec3> = all.map(|g| s.body[g] * s.sun[g] * s.sunlit[g]).collect();
     for (what, covariate, direction) in [("r/|r|", "attitude", &radial), ("nu s", "sun_angle", &sun)] {
         let mut members = Vec::new();
-        for tau_s in [1000.0, 3000.0, 10_000.0] {
+        for tau_s in LATE_S {
             let mut late = direction.clone();
             // What warms may warm another, and that pushes.
             for after in ["relaxing", "relaxing twice"] {
@@ -188,9 +192,8 @@ fn close_ones(s: &Scene, kind: &str, spans: &[[f64; 2]]) -> Vec<(String, Vec<f64
         return Vec::new();
     }
     let push = |tau_s: f64| {
-        let after = |pair: &[[f64; 2]]| (pair[1], (-(pair[1][0] - pair[0][1]).max(0.0) / tau_s).exp());
         let formula = format!("{kind} lasts, exp(-(pause before it)/{tau_s:.0} s)");
-        (formula, weighted_coverage(s.clock_s(), spans.windows(2).map(after)))
+        (formula, weighted_coverage(s.clock_s(), spans.iter().copied().zip(still_warm(spans, tau_s))))
     };
     EVENT_TAUS_S.into_iter().map(push).collect()
 }

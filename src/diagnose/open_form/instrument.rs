@@ -1,6 +1,6 @@
 //! Forms of the sensor: its own signal, and its temperature.
 
-use super::history::follower;
+use super::history::{LATE_S, follower};
 use super::{AXIS, Collector};
 use crate::diagnose::scene::Scene;
 use crate::physics::Vec3;
@@ -78,7 +78,7 @@ pub(super) fn sensor(c: &mut Collector) {
             (format!("m{} beyond {level:.0} ng", AXIS[i]), beyond)
         });
         c.family("modelled_signal", place, beyond);
-        let late = [1000.0, 3000.0, 10_000.0].map(|tau_s| {
+        let late = LATE_S.map(|tau_s| {
             let late = follower(&s.grid_s, &s.simulated_grid_ng[i], tau_s);
             (format!("m{}, relaxing in {tau_s:.0} s", AXIS[i]), s.measure_scalar(|g| late[g]))
         });

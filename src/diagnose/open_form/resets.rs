@@ -2,15 +2,13 @@
 //! data leave.
 
 use super::Collector;
-use super::history::since;
+use super::history::{PAUSE_TAUS_S, since};
 use crate::diagnose::case::{HALF_WINDOW_S, WINDOW_STRIDE_S};
 use crate::diagnose::instants::changes_of_attitude;
 use crate::diagnose::scene::Scene;
 
 /// Windows that are missing in what counts as a gap: fewer are lost on the way, and nothing happens in them.
 const GAP_WINDOWS: f64 = 4.0;
-/// Times in which what a gap begins dies away, s.
-const GAP_TAUS_S: [f64; 4] = [300.0, 1000.0, 3000.0, 10_000.0];
 
 /// Where the gaps of a recording end.
 fn gap_ends(clock_s: &[f64]) -> Vec<f64> {
@@ -66,7 +64,7 @@ pub(super) fn resets(c: &mut Collector) {
     if gaps.len() > 1 {
         let instants: Vec<(f64, f64)> = gaps.iter().map(|t| (*t, 1.0)).collect();
         let dying = |tau: f64| (format!("exp(-(time since a gap)/{tau:.0} s)"), since(s, &instants, tau));
-        c.family("time_since_gap", "after gaps of the recording", GAP_TAUS_S.map(dying));
+        c.family("time_since_gap", "after gaps of the recording", PAUSE_TAUS_S.map(dying));
     }
 }
 
