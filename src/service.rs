@@ -111,7 +111,7 @@ impl Service {
         let address_of = |listener: &TcpListener| listener.local_addr().map_err(ServiceError::Http);
         let (ingest_address, http_address) = (address_of(&ingest)?, address_of(&http)?);
         let settings = config.settings.clone();
-        let log = Arc::new(RawLog::open(&config.data_dir, &settings.mission, settings.link.spacecraft_id)?);
+        let log = Arc::new(RawLog::open(&config.data_dir, &settings.mission, &settings.link)?);
         let station: SharedStation = Arc::new(RwLock::new(Station::new(settings.clone(), None)));
         let samples = Arc::new(StationSamples(station.clone()));
         let queue = config.http.live_queue_messages;

@@ -125,7 +125,7 @@ const POINTS_MAX: usize = 100_000;
 
 /// Body-axis acceleration over a span: min, mean and max in buckets.
 #[utoipa::path(get, path = "/accel/history", tag = "acceleration", params(Span),
-    responses((status = 200, body = History), (status = 400, description = "a parameter makes no sense")))]
+    responses((status = 200, body = History)))]
 pub async fn history(State(app): State<Arc<App>>, Asked(span): Asked<Span>) -> Result<Json<History>, Problem> {
     let from = optional_clock(&app.mission, "from", span.from.as_deref())?;
     let to = optional_clock(&app.mission, "to", span.to.as_deref())?;

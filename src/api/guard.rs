@@ -18,7 +18,7 @@ pub const BODY_OCTETS_MAX: usize = 64 << 10;
 /// Longest path and query.
 const URI_OCTETS_MAX: usize = 8 << 10;
 /// Answered without a token: they tell nothing but that the service is there.
-const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
+pub(super) const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
 
 /// Turns away what is too large or has no token, and counts what is answered.
 pub async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {

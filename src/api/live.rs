@@ -51,7 +51,7 @@ enum From {
 
 /// Live messages over a WebSocket.
 #[utoipa::path(get, path = "/accel/live", tag = "acceleration", params(Wish),
-    responses((status = 101, description = "one JSON object a message: seq, prev, type, ..."), (status = 400, description = "a parameter makes no sense")))]
+    responses((status = 101, description = "one JSON object a message: seq, prev, type, ...")))]
 pub async fn live(
     State(app): State<Arc<App>>,
     Asked(wish): Asked<Wish>,

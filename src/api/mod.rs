@@ -21,7 +21,8 @@ use axum::routing::get;
 use axum::{Json, Router, middleware};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
-use utoipa::openapi::{InfoBuilder, OpenApi, OpenApiBuilder};
+use utoipa::openapi::path::Operation;
+use utoipa::openapi::{Content, InfoBuilder, OpenApi, OpenApiBuilder, Response};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -100,5 +101,25 @@ fn described(openapi: OpenApi) -> OpenApi {
         .version(env!("CARGO_PKG_VERSION"))
         .description(Some("Quasi-steady acceleration of the Orbiter in body axes, from OARE telemetry"));
     let builder: OpenApiBuilder = openapi.into();
-    builder.info(info.build()).build()
+    let mut openapi = builder.info(info.build()).build();
+    for (path, item) in &mut openapi.paths.paths {
+        if let Some(operation) = &mut item.get {
+            describe_problems(path, operation);
+        }
+    }
+    openapi
+}
+
+/// The problems that any route of its kind may answer with.
+fn describe_problems(path: &str, operation: &mut Operation) {
+    let parameters = operation.parameters.as_ref().is_some_and(|parameters| !parameters.is_empty());
+    let problems = [
+        ("400", "a parameter makes no sense", parameters),
+        ("401", "the service has a token, and the request does not", !guard::OPEN_PATHS.contains(&path)),
+        ("414", "path and query are too long", true),
+    ];
+    for (status, description, _) in problems.into_iter().filter(|(_, _, may)| *may) {
+        let problem = Response::builder().description(description).content(problem::MEDIA_TYPE, Content::default());
+        operation.responses.responses.entry(status.to_owned()).or_insert_with(|| problem.build().into());
+    }
 }

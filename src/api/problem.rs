@@ -4,6 +4,9 @@ use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use problem_details::ProblemDetails;
 
+/// The media type of a problem document.
+pub const MEDIA_TYPE: &str = "application/problem+json";
+
 /// What a handler answers when it cannot answer.
 #[derive(Debug)]
 pub struct Problem {

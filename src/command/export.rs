@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use clap::ValueEnum;
 use oare_ground::hub::{Body, Message};
 use oare_ground::ingest::log_replay::rebuild;
-use oare_ground::ingest::raw_log::RawLog;
+use oare_ground::ingest::raw_log::{RawLog, StoreError};
 use oare_ground::pipeline::{Station, files};
 use oare_ground::record::{mcap_file::Recording, table};
 use oare_ground::units::{Clock, MissionTime};
@@ -62,12 +62,22 @@ pub fn run(args: Args) -> Result<ExitCode> {
             return Ok(super::unusable());
         }
     };
+    if from > to {
+        eprintln!("oare export: --from is after --to: {} s and {} s", from.seconds(), to.seconds());
+        return Ok(super::unusable());
+    }
     if !args.data.join("raw.redb").is_file() {
         eprintln!("oare export: there is no raw log in {}", args.data.display());
         return Ok(super::unusable());
     }
-    let log = RawLog::open(&args.data, &settings.mission, settings.link.spacecraft_id)?;
-    let station = rebuild(&log, &settings)?;
+    let log = RawLog::open(&args.data, &settings.mission, &settings.link)?;
+    let station = match rebuild(&log, &settings) {
+        Err(fault @ StoreError::FrameOctets { .. }) => {
+            eprintln!("oare export: {fault}");
+            return Ok(super::unusable());
+        }
+        rebuilt => rebuilt?,
+    };
     fs::create_dir_all(&args.out).with_context(|| format!("cannot make {}", args.out.display()))?;
     match args.format {
         Format::Csv => write_tables(&station, &args.out, from, to)?,

@@ -78,7 +78,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
         let report = report(&station);
         write_report(folder, &report.paper, ("accuracy.json", &pretty(&report.accuracy)?))?;
     }
-    summarise(&station, args.json)
+    let whole = streams.iter().all(|stream| stream.whole);
+    Ok(if summarise(&station, args.json)? && whole { super::DONE } else { super::done_in_part() })
 }
 
 fn read_calibration(path: &Path) -> Result<KnownCalibration> {
@@ -90,17 +91,20 @@ fn read_calibration(path: &Path) -> Result<KnownCalibration> {
 struct Stream {
     link: LinkConfig,
     octets: Vec<u8>,
+    /// Not a recording that was cut off or damaged.
+    whole: bool,
 }
 
 /// A dump, or the frames of a recording, whose channel coding is removed already.
 fn read_stream(path: &Path, link: LinkConfig) -> Result<Stream> {
     let octets = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     if !mcap_reader::is_mcap(&octets) {
-        return Ok(Stream { link, octets });
+        return Ok(Stream { link, octets, whole: true });
     }
     let link = LinkConfig { randomised: false, reed_solomon_interleave: None, ..link };
-    let octets = mcap_reader::dump(&octets, &link).with_context(|| format!("cannot use {}", path.display()))?;
-    Ok(Stream { link, octets })
+    let recorded = mcap_reader::dump(&octets, &link).with_context(|| format!("cannot use {}", path.display()))?;
+    recorded.faults.iter().for_each(|fault| eprintln!("oare process: {}: {fault}", path.display()));
+    Ok(Stream { link, octets: recorded.dump, whole: recorded.faults.is_empty() })
 }
 
 /// Reads every stream; parts come with the number of their playback.
@@ -161,8 +165,8 @@ fn pretty(value: &serde_json::Value) -> Result<String> {
     Ok(serde_json::to_string_pretty(value)? + "\n")
 }
 
-/// Tells what was taken in, and what could not be used.
-fn summarise(station: &Station, json: bool) -> Result<ExitCode> {
+/// Tells what was taken in, and what could not be used; whether everything could.
+fn summarise(station: &Station, json: bool) -> Result<bool> {
     let total = station.ledger().total();
     if json {
         println!("{}", serde_json::to_string(&files::ledger_json(station))?);
@@ -185,6 +189,5 @@ fn summarise(station: &Station, json: bool) -> Result<ExitCode> {
     for (reason, n) in &total.packets_refused {
         eprintln!("  {n} packets refused: {reason}");
     }
-    let in_part = refused + packets_refused > 0 || total.frames_found == 0;
-    Ok(if in_part { super::done_in_part() } else { super::DONE })
+    Ok(refused + packets_refused == 0 && total.frames_found > 0)
 }

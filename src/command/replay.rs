@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::{ErrorKind, Write};
 use std::net::{SocketAddr, TcpStream};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
 use std::time::{Duration, Instant};
@@ -11,7 +11,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader, Verdict};
-use oare_ground::record::{frame_clock, mcap_reader};
+use oare_ground::record::frame_clock;
+use oare_ground::record::mcap_reader::{self, Recorded};
 
 /// Arguments of `oare replay`.
 #[derive(clap::Args)]
@@ -64,24 +65,31 @@ pub fn run(args: Args) -> Result<ExitCode> {
     };
     let mut dumps = Vec::new();
     for path in &args.files {
-        let octets = match fs::read(path) {
-            Ok(octets) => octets,
+        match read(path, &link) {
+            Ok(dump) => dumps.push((path, dump)),
             Err(error) => {
-                eprintln!("oare replay: cannot read {}: {error}", path.display());
+                eprintln!("oare replay: {error:#}");
                 return Ok(super::unusable());
             }
-        };
-        let dump = match mcap_reader::is_mcap(&octets) {
-            true => mcap_reader::dump(&octets, &link).with_context(|| format!("cannot use {}", path.display()))?,
-            false => octets,
-        };
-        dumps.push((path, dump));
+        }
     }
-    for (path, dump) in &dumps {
+    let mut whole = true;
+    for (path, Recorded { dump, faults }) in &dumps {
         eprintln!("oare replay: {} to {}", path.display(), args.to);
+        faults.iter().for_each(|fault| eprintln!("oare replay: {}: {fault}", path.display()));
+        whole &= faults.is_empty();
         send(dump, args.to, args.speed, &link)?;
     }
-    Ok(super::DONE)
+    Ok(if whole { super::DONE } else { super::done_in_part() })
+}
+
+/// A dump, or a recording as one.
+fn read(path: &Path, link: &LinkConfig) -> Result<Recorded> {
+    let octets = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    match mcap_reader::is_mcap(&octets) {
+        true => mcap_reader::dump(&octets, link).with_context(|| format!("cannot use {}", path.display())),
+        false => Ok(Recorded { dump: octets, faults: Vec::new() }),
+    }
 }
 
 /// Sends one dump over one connection.

@@ -7,6 +7,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use oare_ground::config::Config;
+use oare_ground::ingest::raw_log::StoreError;
 use oare_ground::service::{Service, ServiceError};
 use tokio::signal::unix::{SignalKind, signal};
 
@@ -45,6 +46,10 @@ pub fn run(args: Args) -> Result<ExitCode> {
             Ok(service) => service,
             Err(ServiceError::Config(faults)) => {
                 eprintln!("oare serve: {faults}");
+                return Ok(super::unusable());
+            }
+            Err(ServiceError::Store(fault @ StoreError::FrameOctets { .. })) => {
+                eprintln!("oare serve: {fault}");
                 return Ok(super::unusable());
             }
             Err(error) => return Err(error.into()),

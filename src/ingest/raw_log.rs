@@ -17,7 +17,7 @@ use super::batch;
 pub use super::batch::Stored;
 use crate::hub::journal;
 use crate::hub::told::{self, Told};
-use crate::ingest::wire::{Arrival, FrameId, Verdict};
+use crate::ingest::wire::{Arrival, FrameId, LinkConfig, Verdict};
 
 const BATCHES: TableDefinition<&[u8], &[u8]> = TableDefinition::new("batches");
 const FRAMES: TableDefinition<&[u8], (u64, u32)> = TableDefinition::new("frames");
@@ -75,6 +75,18 @@ pub enum StoreError {
         /// What the system says.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// The store was filled over another link.
+    #[error("the store {} holds frames of {stored} octets (batch {number}), and the configuration has link.frame_octets = {configured}", .path.display())]
+    FrameOctets {
+        /// The file.
+        path: PathBuf,
+        /// Number of the batch.
+        number: u64,
+        /// Octets of a frame there.
+        stored: usize,
+        /// Octets of a frame by the configuration.
+        configured: usize,
+    },
     /// A batch does not decode.
     #[error("batch {number} of the store is damaged at octet {offset}: {found}")]
     Damaged {
@@ -103,6 +115,8 @@ pub struct RawLog {
     path: PathBuf,
     /// Mission, NUL, spacecraft id: in front of every key.
     prefix: Vec<u8>,
+    /// Octets of a frame.
+    frame_octets: usize,
     /// None while the file is being opened again after a fault.
     database: RwLock<Option<Database>>,
     /// Batches in the log.
@@ -113,19 +127,20 @@ pub struct RawLog {
 }
 
 impl RawLog {
-    /// Opens or makes the store in a directory.
+    /// Opens or makes the store in a directory; every page of it is held against its checksum first.
     ///
     /// # Errors
-    /// When the directory or the file cannot be used, or another process holds it.
-    pub fn open(directory: &Path, mission: &str, spacecraft_id: u16) -> Result<Self, StoreError> {
+    /// When the directory or the file cannot be used, the file was altered since it was written, or another process holds it.
+    pub fn open(directory: &Path, mission: &str, link: &LinkConfig) -> Result<Self, StoreError> {
         let path = directory.join("raw.redb");
         let failed = |source| StoreError::Open { path: path.clone(), source };
         std::fs::create_dir_all(directory).map_err(|error| failed(error.into()))?;
-        let database = open_database(&path).map_err(failed)?;
-        let prefix = [mission.as_bytes(), &[0], &spacecraft_id.to_be_bytes()].concat();
+        let database = open_database(&path, true).map_err(failed)?;
+        let prefix = [mission.as_bytes(), &[0], &link.spacecraft_id.to_be_bytes()].concat();
         Ok(Self {
             path,
             prefix,
+            frame_octets: link.frame_octets,
             database: RwLock::new(Some(database)),
             batches: AtomicU64::new(0),
             known: Mutex::default(),
@@ -228,7 +243,8 @@ impl RawLog {
     pub fn reopen(&self) -> Result<(), StoreError> {
         let mut held = self.database.write().expect("no holder panics");
         *held = None;
-        *held = Some(open_database(&self.path).map_err(|source| StoreError::Open { path: self.path.clone(), source })?);
+        let failed = |source| StoreError::Open { path: self.path.clone(), source };
+        *held = Some(open_database(&self.path, false).map_err(failed)?);
         Ok(())
     }
 
@@ -236,7 +252,8 @@ impl RawLog {
     /// [`RawLog::resolve`].
     ///
     /// # Errors
-    /// When the file cannot be read or a batch is damaged; what came before has been handed on. And what `hand_on` says.
+    /// When the file cannot be read, a batch is damaged, or frames are of another length; what came before has been handed on. And what
+    /// `hand_on` says.
     pub fn replay(
         &self,
         mut hand_on: impl FnMut(u64, Vec<Stored>) -> Result<(), StoreError>,
@@ -249,6 +266,7 @@ impl RawLog {
                     offset,
                 ) = stored
                 {
+                    self.of_our_length(number, octets)?;
                     let digest = Sha256::digest(octets)[..16].try_into().expect("a digest has 32 octets");
                     let place = Place { batch: number, offset: *offset };
                     self.known.lock().expect("no holder panics").insert((*id, digest), place);
@@ -259,6 +277,14 @@ impl RawLog {
             self.batches.fetch_max(number, Ordering::Release);
         }
         Ok(())
+    }
+
+    fn of_our_length(&self, number: u64, frame: &[u8]) -> Result<(), StoreError> {
+        if frame.len() == self.frame_octets {
+            return Ok(());
+        }
+        let (path, configured) = (self.path.clone(), self.frame_octets);
+        Err(StoreError::FrameOctets { path, number, stored: frame.len(), configured })
     }
 
     /// The entries of a batch that hold a frame for the first time, or a refused one; repeats left out.
@@ -411,6 +437,6 @@ pub struct JournalPart<'a> {
     pub batches: u64,
 }
 
-fn open_database(path: &Path) -> Result<Database, Box<dyn std::error::Error + Send + Sync>> {
-    Ok(Database::builder().set_cache_size(CACHE_OCTETS).create(path)?)
+fn open_database(path: &Path, checked: bool) -> Result<Database, Box<dyn std::error::Error + Send + Sync>> {
+    Ok(Database::builder().set_cache_size(CACHE_OCTETS).set_check_integrity_on_open(checked).create(path)?)
 }

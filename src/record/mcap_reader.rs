@@ -22,39 +22,69 @@ struct FrameMessage<'a> {
     octets: std::borrow::Cow<'a, str>,
 }
 
+/// What a recording holds.
+#[derive(Debug)]
+pub struct Recorded {
+    /// Its frames as a dump.
+    pub dump: Vec<u8>,
+    /// Why there may have been more: the file is cut off or damaged.
+    pub faults: Vec<String>,
+}
+
 /// The frames of a recording as one forward dump: each behind a sync marker, refused ones too where they are whole. A recording cut
-/// off by a crash is read as far as it goes.
+/// off by a crash is read as far as it goes, and messages that cannot be read are left out.
 ///
 /// Frames stand in a recording without their channel coding; the dump has that of `link`.
 ///
 /// # Errors
 /// When the octets are no MCAP, or no recording of ours.
-pub fn dump(octets: &[u8], link: &LinkConfig) -> Result<Vec<u8>, RecordError> {
+pub fn dump(octets: &[u8], link: &LinkConfig) -> Result<Recorded, RecordError> {
     let options = enumset::EnumSet::only(mcap::read::Options::IgnoreEndMagic);
     let messages = mcap::MessageStream::new_with_options(octets, options).map_err(RecordError::Read)?;
     let mut dump = Vec::new();
     let mut frames = 0u64;
+    let mut unread = Vec::new();
+    let mut cut_off = (!octets.ends_with(mcap::MAGIC)).then(|| "its end is missing".to_owned());
     for message in messages {
         let message = match message {
             Ok(message) => message,
-            // The end of a file that was cut off.
-            Err(_) if frames > 0 => break,
+            Err(error) if frames > 0 => {
+                cut_off = Some(error.to_string());
+                break;
+            }
             Err(error) => return Err(RecordError::Read(error)),
         };
         if message.channel.topic != FRAME_TOPIC {
             continue;
         }
-        let refuse = |found: String| RecordError::Frame { topic: FRAME_TOPIC, sequence: message.sequence, found };
-        let frame: FrameMessage<'_> =
-            serde_json::from_slice(&message.data).map_err(|error| refuse(error.to_string()))?;
-        let octets = STANDARD.decode(frame.octets.as_bytes()).map_err(|error| refuse(error.to_string()))?;
-        frames += 1;
-        if frame.verdict != "truncated" {
-            dump.extend(SYNC_MARKER.to_be_bytes());
-            // What could not be decoded is kept as it came.
-            let as_sent = if octets.len() == link.frame_octets { encode(link, &octets) } else { octets };
-            dump.extend(as_sent);
+        match frame(&message) {
+            Ok((verdict, octets)) => {
+                frames += 1;
+                if verdict != "truncated" {
+                    dump.extend(SYNC_MARKER.to_be_bytes());
+                    // What could not be decoded is kept as it came.
+                    let as_sent = if octets.len() == link.frame_octets { encode(link, &octets) } else { octets };
+                    dump.extend(as_sent);
+                }
+            }
+            Err(error) => unread.push(error),
         }
     }
-    if frames == 0 { Err(RecordError::NoFrames { expected: FRAME_TOPIC }) } else { Ok(dump) }
+    let faults = [
+        unread.first().map(|first| format!("{} frames of it cannot be read, the first: {first}", unread.len())),
+        cut_off.map(|why| format!("{frames} frames are read of it and no more: {why}")),
+    ];
+    match unread.into_iter().next() {
+        Some(first) if frames == 0 => Err(first),
+        None if frames == 0 => Err(RecordError::NoFrames { expected: FRAME_TOPIC }),
+        _ => Ok(Recorded { dump, faults: faults.into_iter().flatten().collect() }),
+    }
+}
+
+/// The verdict and the octets of one frame.
+fn frame(message: &mcap::Message<'_>) -> Result<(String, Vec<u8>), RecordError> {
+    let refuse = |found: String| RecordError::Frame { topic: FRAME_TOPIC, sequence: message.sequence, found };
+    let frame: FrameMessage<'_> = serde_json::from_slice(&message.data).map_err(|error| refuse(error.to_string()))?;
+    let octets = STANDARD.decode(frame.octets.as_bytes()).map_err(|error| refuse(error.to_string()))?;
+    Ok((frame.verdict.into_owned(), octets))
 }

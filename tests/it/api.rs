@@ -44,6 +44,16 @@ async fn every_named_route_answers_and_is_described() {
     for path in named {
         assert!(openapi["paths"][path]["get"].is_object(), "{path} is not described");
     }
+    let described = |path: &str, status: &str| {
+        openapi["paths"][path]["get"]["responses"][status]["content"]["application/problem+json"].is_object()
+    };
+    for (path, has_parameters) in
+        [("/accel", false), ("/accel/history", true), ("/accel/live", true), ("/calibration", true), ("/gaps", false)]
+    {
+        assert_eq!(described(path, "400"), has_parameters, "{path}");
+        assert!(described(path, "401") && described(path, "414"), "{path}");
+    }
+    assert!(!described("/healthz", "401") && !described("/readyz", "401"));
     for path in ["/gaps", "/playbacks", "/events", "/anomalies", "/calibration/history", "/status", "/accel/history"] {
         running.get(path).await;
     }

@@ -68,7 +68,7 @@ async fn a_drain_takes_what_was_sent_and_tells_the_readers() {
     drop(sender);
     while live.next().await.is_some() {}
     let settings = Settings::sts65();
-    let log = RawLog::open(dir.path(), &settings.mission, settings.link.spacecraft_id).unwrap();
+    let log = RawLog::open(dir.path(), &settings.mission, &settings.link).unwrap();
     let station = rebuild(&log, &settings).unwrap();
     assert_eq!(station.ledger().seconds.len(), 2000);
     assert_eq!(station.ledger().playbacks().filter(|(_, playback)| !playback.closed).count(), 0);
@@ -94,7 +94,16 @@ async fn a_recording_holds_every_frame_and_reads_back_to_the_same_products() {
             .values()
             .all(|channel| channel.schema.as_ref().is_some_and(|schema| schema.encoding == "jsonschema"))
     );
-    assert_eq!(undisturbed(&[mcap_reader::dump(&octets, &LinkConfig::default()).unwrap()]), products);
+    let recorded = mcap_reader::dump(&octets, &LinkConfig::default()).unwrap();
+    assert!(recorded.faults.is_empty(), "{:?}", recorded.faults);
+    assert_eq!(undisturbed(&[recorded.dump]), products);
+    // Cut off, and with an octet altered, it is read as far as it goes, and that is said.
+    let said = |octets: &[u8]| mcap_reader::dump(octets, &LinkConfig::default()).unwrap().faults.concat();
+    let cut = said(&octets[..octets.len() / 2]);
+    assert!(cut.contains("frames are read of it and no more"), "{cut}");
+    let mut altered = octets.clone();
+    altered[octets.len() / 2] ^= 0x10;
+    assert_ne!(said(&altered), "");
     read_with_python(&paths[0], &octets);
     // What follows goes into a file of its own.
     let running = Running { service: Service::start(config(&dir)).await.unwrap(), dir };
@@ -103,6 +112,36 @@ async fn a_recording_holds_every_frame_and_reads_back_to_the_same_products() {
     let Running { service, dir } = running;
     service.drain().await.unwrap();
     assert_eq!(std::fs::read_dir(dir.path().join("recordings")).unwrap().count(), 2);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_store_that_was_altered_or_filled_over_another_link_is_told() {
+    let running = start().await;
+    running.send(&dump(20_000, 2000, 0)).await;
+    running.wait_for_playbacks(1).await;
+    let Running { service, dir } = running;
+    service.drain().await.unwrap();
+    let settings = Settings::sts65();
+    let replayed = |frame_octets: usize| {
+        let link = LinkConfig { frame_octets, ..settings.link };
+        RawLog::open(dir.path(), &settings.mission, &link).and_then(|log| log.replay(|_, _| Ok(())))
+    };
+    replayed(1115).unwrap();
+    let said = replayed(512).unwrap_err().to_string();
+    assert!(
+        said.ends_with("holds frames of 1115 octets (batch 0), and the configuration has link.frame_octets = 512"),
+        "{said}"
+    );
+    // An octet amid the frames, of which the file's own structure knows nothing.
+    let path = dir.path().join("raw.redb");
+    let mut octets = std::fs::read(&path).unwrap();
+    let sent = dump(20_000, 2000, 0);
+    let piece = &sent[sent.len() / 2 / 1119 * 1119 + 500..][..64];
+    let at = octets.windows(piece.len()).position(|there| there == piece).unwrap();
+    octets[at + 32] ^= 1;
+    std::fs::write(&path, octets).unwrap();
+    let said = replayed(1115).unwrap_err().to_string();
+    assert!(said.contains("raw.redb") && said.to_lowercase().contains("corrupt"), "{said}");
 }
 
 /// The package of the format's own makers reads what is written here.
@@ -242,7 +281,7 @@ async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, within_s: f64, seed: u6
         program.kill();
         tape = sender.join().unwrap();
         let settings = Settings::sts65();
-        let log = RawLog::open(dir.path(), &settings.mission, settings.link.spacecraft_id).unwrap();
+        let log = RawLog::open(dir.path(), &settings.mission, &settings.link).unwrap();
         let mut durable = 0;
         log.replay(|_, batch| {
             let marks =
@@ -274,7 +313,7 @@ async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, within_s: f64, seed: u6
     }
     program.kill();
     let settings = Config::standard().settings;
-    let log = RawLog::open(dir.path(), &settings.mission, settings.link.spacecraft_id).unwrap();
+    let log = RawLog::open(dir.path(), &settings.mission, &settings.link).unwrap();
     assert_eq!(products(&rebuild(&log, &settings).unwrap()), expected);
 }
 

@@ -34,6 +34,9 @@ pub enum PadError {
         /// Bytes there.
         found: usize,
     },
+    /// There are no data.
+    #[error("PAD data: there is no sample")]
+    Empty,
     /// A sample is not four finite numbers, or time runs backwards.
     #[error("PAD data, sample {sample}: expected {expected}, found {found}")]
     Sample {
@@ -121,6 +124,9 @@ impl Pad {
     /// From the header's text and the data's bytes.
     pub fn read(xml: &str, data: &[u8]) -> Result<Self, PadError> {
         let header = PadHeader::parse(xml)?;
+        if data.is_empty() {
+            return Err(PadError::Empty);
+        }
         if !data.len().is_multiple_of(SAMPLE_BYTES) {
             return Err(PadError::Length { found: data.len() });
         }
@@ -212,6 +218,7 @@ mod tests {
         assert!(said(&header(LITTLE), &bytes(&[0.0, f32::NAN, 0.0, 0.0])).contains("sample 0: expected four finite"));
         assert!(said(&header("text"), &[]).contains("expected 32-bit IEEE floats"));
         assert!(said(&header(LITTLE).replace("142.00", "fast"), &[]).contains("<SampleRate>, found \"fast\""));
+        assert_eq!(said(&header(LITTLE), &[]), "PAD data: there is no sample");
         assert!(said("not xml", &[]).starts_with("PAD header: "));
     }
 }
