@@ -3,11 +3,13 @@
 
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::measured::Answer;
+use oare_ground::diagnose::measured::answer::HeldOut;
 
 use super::{contributions_add_up, diagnose, ids};
 
 /// Three satellites of three planes, for the fast tests.
 const FEW: &str = "recording.satellites=[\"G05\",\"G13\",\"G24\"]";
+const FEW_ARCS: f64 = 3.0;
 const RADIATION: [&str; 4] = ["solar_radiation_pressure", "srp_y_bias", "srp_b_bias", "srp_once_per_rev"];
 
 fn includes(words: &[&str]) -> String {
@@ -43,6 +45,12 @@ fn a_half_predicts_the_other_as_the_first_day_does_the_second() {
     for (half, flown) in [(whole.before_rms[0], day.before_rms[0]), (whole.after_rms[0], day.after_rms[0])] {
         // Halves differ by one epoch of ninety-six, which a prediction of a day feels by some per cent.
         assert!((half / flown - 1.0).abs() < 0.1, "{half} m, {flown} m");
+    }
+    let of_one_ratio = |held: &HeldOut| (held.before_rms[0] / held.after_rms[0]).ln();
+    for held in [&whole, &day] {
+        let (gain, error) = (held.log_score_gain.unwrap(), held.log_score_gain_se.unwrap());
+        let arcs = gain / of_one_ratio(held);
+        assert!(gain > 5.0 * error && (0.7..1.3).contains(&(arcs / FEW_ARCS)), "{held:?}");
     }
 }
 

@@ -101,6 +101,10 @@ pub struct HeldOut {
     pub after_rms: Vec<f64>,
     /// Share of the excess over the noise that the prediction removes.
     pub excess_removed: f64,
+    /// Log score gained on the units left out (see [`super::log_score`]); none of fewer than three.
+    pub log_score_gain: Option<f64>,
+    /// Its standard error.
+    pub log_score_gain_se: Option<f64>,
 }
 
 /// A limit.

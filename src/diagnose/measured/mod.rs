@@ -5,6 +5,7 @@
 
 pub mod answer;
 mod figures;
+pub mod log_score;
 pub mod page;
 pub mod plates;
 pub mod spread;

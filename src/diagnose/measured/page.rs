@@ -160,13 +160,18 @@ fn predicts(out: &mut String, answer: &Answer) {
         return;
     };
     let list = |v: &[f64]| v.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
+    let log_score = match (held.log_score_gain, held.log_score_gain_se) {
+        (Some(gain), Some(error)) => format!("; the log score rises by {} ± {}", number(gain), number(error)),
+        _ => String::new(),
+    };
     let _ = writeln!(
         out,
-        "<p>On data not used for the fit ({}): {} before, {} after, {}.</p>",
+        "<p>On data not used for the fit ({}): {} before, {} after, {}{}.</p>",
         escaped(&held.scheme),
         list(&held.before_rms),
         list(&held.after_rms),
-        escaped(&answer.unit)
+        escaped(&answer.unit),
+        log_score
     );
 }
 

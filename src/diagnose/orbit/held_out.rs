@@ -2,8 +2,7 @@
 //! prediction of what follows `fit_hours`, which the fit itself flies on to (see `search`).
 
 use super::arc::{Arc, ArcFit, EPOCHS_MIN, solve};
-use super::search::{Level, Problem, residual};
-use crate::diagnose::measured::spread::median;
+use super::search::{Level, Problem, predicted_m, residual};
 
 /// Rms of the 3-D residual over the second half of an arc, m, when its state and the coefficients of its level are fitted to the
 /// first half alone: linear about the fit of the whole arc, from which neither half is far. None where the halves are too short,
@@ -24,9 +23,16 @@ fn second_half_predicted_m(arc: &Arc, fit: &ArcFit) -> Option<f64> {
     rms.is_finite().then_some(rms)
 }
 
-/// Median over the arcs, m.
-pub fn median_second_half_m(problem: &Problem, level: &Level) -> Option<f64> {
-    let arcs = problem.arcs.iter().zip(&level.fits);
-    let each: Vec<f64> = arcs.filter_map(|(arc, fit)| second_half_predicted_m(arc, fit)).collect();
-    (!each.is_empty()).then(|| median(each))
+/// What every arc is missed by, and in which way, m: what follows `fit_hours`, or where nothing does the second half of each.
+pub fn missed_m(problem: &Problem, level: &Level) -> (&'static str, Vec<Option<f64>>) {
+    let each = |of: fn(&Arc, &ArcFit) -> Option<f64>| -> Vec<Option<f64>> {
+        problem.arcs.iter().zip(&level.fits).map(|(arc, fit)| of(arc, fit)).collect()
+    };
+    let beyond = each(predicted_m);
+    match beyond.iter().any(Option::is_some) {
+        true => ("what follows fit_hours, predicted; median of the arcs, 3-D", beyond),
+        false => {
+            ("the second half of each arc, from its first; median of the arcs, 3-D", each(second_half_predicted_m))
+        }
+    }
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::arc::{Arc, ArcFit};
 use super::forces::Term;
-use super::held_out::median_second_half_m;
+use super::held_out::missed_m;
 use super::manoeuvre::Manoeuvre;
 use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m};
 use crate::diagnose::answer::{Alternative, Interval, Located, ParameterAnswer, Verdict};
@@ -13,7 +13,7 @@ use crate::diagnose::measured::answer::{
 };
 use crate::diagnose::measured::plates::OrbitPlate;
 use crate::diagnose::measured::spread::{median, scatter};
-use crate::diagnose::measured::{Answer, Plates};
+use crate::diagnose::measured::{Answer, Plates, log_score};
 
 /// Posterior from which on a term that all arcs together show is an effect of one of them.
 const SHOWN: f64 = 0.5;
@@ -276,25 +276,30 @@ fn fit(problem: &Problem, first: &Level, last: &Level) -> Fit {
         let whitened_chi2_per_dof = rms_total * rms_total / (3.0 * problem.sigma_m * problem.sigma_m);
         FitLevel { rms: axis_rms(problem, level), rms_total, whitened_chi2_per_dof }
     };
-    let on = |scheme: &str, of: &dyn Fn(&Level) -> Option<f64>| Some(held_out(problem, scheme, of(first)?, of(last)?));
-    let held_out =
-        on("what follows fit_hours, predicted; median of the arcs, 3-D", &|level| problem.median_predicted_m(level))
-            .or_else(|| {
-                let scheme = "the second half of each arc, from its first; median of the arcs, 3-D";
-                on(scheme, &|level| median_second_half_m(problem, level))
-            });
+    let held_out = held_out(problem, first, last);
     Fit { noise_floor: vec![problem.sigma_m; 3], before: level(first), after: level(last), held_out }
 }
 
-fn held_out(problem: &Problem, scheme: &str, before_m: f64, after_m: f64) -> HeldOut {
+/// Of the arcs that both levels predict.
+fn held_out(problem: &Problem, first: &Level, last: &Level) -> Option<HeldOut> {
+    let (scheme, before) = missed_m(problem, first);
+    let (_, after) = missed_m(problem, last);
+    let (before, after): (Vec<f64>, Vec<f64>) = before.into_iter().zip(after).filter_map(|(b, a)| b.zip(a)).unzip();
+    if before.is_empty() {
+        return None;
+    }
+    let score = log_score::rises(&before, &after).map(|rises| log_score::gain(&rises));
+    let (before_m, after_m) = (median(before), median(after));
     let floor = 3.0 * problem.sigma_m * problem.sigma_m;
     let excess = (before_m * before_m - floor).max(1e-12);
-    HeldOut {
+    Some(HeldOut {
         scheme: scheme.to_owned(),
         before_rms: vec![before_m],
         after_rms: vec![after_m],
         excess_removed: ((before_m * before_m - after_m * after_m) / excess).clamp(-1.0, 1.0),
-    }
+        log_score_gain: score.map(|[gain, _]| gain),
+        log_score_gain_se: score.map(|[_, error]| error),
+    })
 }
 
 fn limits(problem: &Problem, search: &Search, last: &Level) -> Vec<Limit> {

@@ -18,7 +18,7 @@ use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, in_order, parameter, posterior,
 };
 use crate::diagnose::measured::plates::PosesPlate;
-use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates};
+use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates, log_score};
 use crate::math::rms::rms;
 
 /// Readings at zero acceleration that makers of triads use: none, or the middle of so many bits.
@@ -403,7 +403,7 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
     let step = |(i, fit): (usize, &Triad)| StepAnswer {
         added: i.checked_sub(1).map(|i| found.added[i].0.id().to_owned()),
         rms: fit.rms(),
-        predicted_rms: Some(held_out(&fit.parts, poses, gravity)),
+        predicted_rms: Some(rms(&missed(&fit.parts, poses, gravity))),
         score: i.checked_sub(1).map(|i| found.added[i].1),
     };
     let level = |fit: &Triad| Level {
@@ -411,12 +411,16 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
         rms_total: fit.rms(),
         whitened_chi2_per_dof: (fit.rms() / reading).powi(2),
     };
-    let (before, after) = (held_out(&first.parts, poses, gravity), held_out(&last.parts, poses, gravity));
+    let [before, after] = [first, last].map(|fit| missed(&fit.parts, poses, gravity));
+    let score = log_score::rises(&before, &after).map(|rises| log_score::gain(&rises));
+    let [before, after] = [before, after].map(|missed| rms(&missed));
     let held = HeldOut {
         scheme: "every other pose fitted, the rest predicted, both ways".to_owned(),
         before_rms: vec![before],
         after_rms: vec![after],
         excess_removed: 1.0 - (after / before).powi(2),
+        log_score_gain: score.map(|[gain, _]| gain),
+        log_score_gain_se: score.map(|[_, error]| error),
     };
     let arc = ArcAnswer {
         id: "poses".to_owned(),
@@ -453,10 +457,12 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
     }
 }
 
-fn held_out(parts: &[Part], poses: &[Pose], gravity: f64) -> f64 {
+/// By how much every pose is missed by what is fitted to half of them, the other half, m/s^2.
+fn missed(parts: &[Part], poses: &[Pose], gravity: f64) -> Vec<f64> {
     let half = |odd: usize| poses.iter().skip(odd).step_by(2).copied().collect::<Vec<Pose>>();
     let (even, odd) = (half(0), half(1));
     let mut missed = fit(parts, &even, gravity).predict(&odd, gravity);
     missed.extend(fit(parts, &odd, gravity).predict(&even, gravity));
-    rms(&missed)
+    missed.iter_mut().for_each(|error| *error = error.abs());
+    missed
 }

@@ -3,11 +3,12 @@
 
 use super::follow::Follows;
 use super::read::{Axis, Series};
-use super::search::{AxisFound, held_out, regress};
+use super::search::{AxisFound, held_out, missed, regress};
 use crate::diagnose::answer::{Covariate, Interval, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level, Limit, in_order, parameter, posterior,
 };
+use crate::diagnose::measured::log_score::{gain, rises};
 use crate::diagnose::measured::spread::median;
 use crate::diagnose::measured::{Answer, MeasuredCase};
 
@@ -222,9 +223,12 @@ fn fit(measured: &[&Row<'_>]) -> Fit {
     let power = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
     let before_rms: Vec<f64> = measured.iter().map(|row| held_out(row.series, row.axis, &row.found.included)).collect();
     let after_rms: Vec<f64> = measured.iter().map(|row| held_out(row.series, row.axis, &row.found.model())).collect();
+    let score = log_score(measured);
     let held = HeldOut {
         scheme: "blocks of six hours (four means where they are rarer, an eighth of a shorter span), every other one left out in turn".to_owned(),
         excess_removed: 1.0 - power(&after_rms) / power(&before_rms).max(1e-300),
+        log_score_gain: score.map(|[gain, _]| gain),
+        log_score_gain_se: score.map(|[_, error]| error),
         before_rms,
         after_rms,
     };
@@ -234,6 +238,27 @@ fn fit(measured: &[&Row<'_>]) -> Fit {
         after: level(measured.iter().map(|row| row.found.last().rms()).collect()),
         held_out: Some(held),
     }
+}
+
+/// Log score gained on blocks left out, and its error; the axes of a block, which may err together, are one unit.
+fn log_score(measured: &[&Row<'_>]) -> Option<[f64; 2]> {
+    let mut total: Vec<f64> = Vec::new();
+    for row in measured {
+        let sizes = |effects: &[Follows]| -> Option<Vec<(usize, f64)>> {
+            let blocks = missed(row.series, row.axis, effects)?.into_iter().enumerate();
+            Some(
+                blocks.filter(|(_, (_, n))| *n > 0).map(|(i, (squares, n))| (i, (squares / n as f64).sqrt())).collect(),
+            )
+        };
+        let (places, before): (Vec<usize>, Vec<f64>) = sizes(&row.found.included)?.into_iter().unzip();
+        let after: Vec<f64> = sizes(&row.found.model())?.into_iter().map(|(_, size)| size).collect();
+        let rises = rises(&before, &after)?;
+        for (place, rise) in places.into_iter().zip(rises) {
+            total.resize(total.len().max(place + 1), 0.0);
+            total[place] += rise;
+        }
+    }
+    (!total.is_empty()).then(|| gain(&total))
 }
 
 impl Row<'_> {

@@ -338,23 +338,36 @@ fn widen(
 
 /// Rms of the prediction of blocks left out in turn, a constant per span known only from the rest.
 pub fn held_out(series: &Series, axis: &Axis, effects: &[Follows]) -> f64 {
+    match missed(series, axis, effects) {
+        Some(blocks) => {
+            let (squares, n) = blocks.iter().fold((0.0, 0), |(squares, n), block| (squares + block.0, n + block.1));
+            (squares / n as f64).sqrt()
+        }
+        None => f64::INFINITY,
+    }
+}
+
+/// What every block is missed by: sum of squares, and of how many values. None where the rest does not determine the model.
+pub fn missed(series: &Series, axis: &Axis, effects: &[Follows]) -> Option<Vec<(f64, usize)>> {
     let equation = equation(series, axis, effects);
     let (design, values) = (design(series, &equation), &equation.values);
     let block_s = HELD_OUT_S.max(HELD_OUT_BLOCKS_MIN * series.beat_s()).min(series.shortest_span_s() / 8.0).max(1e-9);
-    let fold = |t: f64| (((t - series.t_s[0]) / block_s) as usize) % 2;
-    let mut squares = 0.0;
+    let block = |i: usize| ((series.t_s[i] - series.t_s[0]) / block_s) as usize;
+    let mut blocks = vec![(0.0, 0); block(values.len() - 1) + 1];
     for left_out in 0..2 {
-        let rows = |wanted: bool| {
-            (0..values.len()).filter(|i| (fold(series.t_s[*i]) == left_out) == wanted).collect::<Vec<usize>>()
-        };
+        let rows =
+            |wanted: bool| (0..values.len()).filter(|i| (block(*i) % 2 == left_out) == wanted).collect::<Vec<usize>>();
         let (kept, missed) = (rows(false), rows(true));
         let (x, y) = (design.select_rows(&kept), DVector::from_iterator(kept.len(), kept.iter().map(|i| values[*i])));
-        let Some(inverse) = x.tr_mul(&x).try_inverse() else { return f64::INFINITY };
-        let solution = inverse * x.tr_mul(&y);
+        let solution = x.tr_mul(&x).try_inverse()? * x.tr_mul(&y);
         let predicted = design.select_rows(&missed) * solution;
-        squares += missed.iter().zip(predicted.iter()).map(|(i, p)| (values[*i] - p).powi(2)).sum::<f64>();
+        for (i, p) in missed.iter().zip(predicted.iter()) {
+            let (squares, n) = &mut blocks[block(*i)];
+            *squares += (values[*i] - p).powi(2);
+            *n += 1;
+        }
     }
-    (squares / values.len() as f64).sqrt()
+    Some(blocks)
 }
 
 /// What the simulation has beside the constant and the reference, with the numbers that its own fit prefers.
