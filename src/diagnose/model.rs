@@ -99,6 +99,8 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
 const ONSET_SCAN_S: f64 = 600.0;
 const ONSET_SCAN_STEPS: i32 = 30;
 const ONSET_SCANS: i32 = 7;
+/// Half width of the closest scan, s.
+const ONSET_FINEST_S: f64 = 1.0;
 /// Log posterior below its top that counts as low.
 const ONSET_LOW: f64 = 5.0;
 
@@ -116,22 +118,33 @@ fn onset_sigma(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: us
         let columns: Vec<Column> = raws.iter().zip(&sizes).map(|(raw, size)| frame.column(raw, *size)).collect();
         Some(chosen.gain(&columns))
     };
-    let mut sigma = 0.0;
-    for scan in 0..ONSET_SCANS {
-        let step = ONSET_SCAN_S * f64::from(1 << scan) / f64::from(ONSET_SCAN_STEPS);
+    // Posterior over the scan, its spread about the fit, and whether it is low at both ends.
+    let scan = |half_width_s: f64| {
+        let step = half_width_s / f64::from(ONSET_SCAN_STEPS);
         let posterior: Vec<(f64, f64)> = (-ONSET_SCAN_STEPS..=ONSET_SCAN_STEPS)
             .map(|s| f64::from(s) * step)
             .filter_map(|shift| Some((shift, gain_at(shift)?)))
             .collect();
         let top = posterior.iter().map(|s| s.1).fold(f64::NEG_INFINITY, f64::max);
         let weight: f64 = posterior.iter().map(|s| (s.1 - top).exp()).sum();
-        if weight > 0.0 {
-            sigma = (posterior.iter().map(|s| s.0 * s.0 * (s.1 - top).exp()).sum::<f64>() / weight).sqrt();
-        }
+        let squares: f64 = posterior.iter().map(|s| s.0 * s.0 * (s.1 - top).exp()).sum();
         let low = |end: Option<&(f64, f64)>| end.is_none_or(|s| s.1 < top - ONSET_LOW);
-        if low(posterior.first()) && low(posterior.last()) {
+        let sigma = if weight > 0.0 { (squares / weight).sqrt() } else { 0.0 };
+        (sigma, low(posterior.first()) && low(posterior.last()))
+    };
+    let mut half_width_s = ONSET_SCAN_S;
+    let (mut sigma, mut enough) = scan(half_width_s);
+    for _ in 1..ONSET_SCANS {
+        if enough {
             break;
         }
+        half_width_s *= 2.0;
+        (sigma, enough) = scan(half_width_s);
+    }
+    // A posterior between two steps of the scan is looked at more closely.
+    while sigma < half_width_s / f64::from(ONSET_SCAN_STEPS) && half_width_s > ONSET_FINEST_S {
+        half_width_s *= 3.0 / f64::from(ONSET_SCAN_STEPS);
+        sigma = scan(half_width_s).0;
     }
     sigma
 }

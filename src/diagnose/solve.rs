@@ -22,6 +22,10 @@ const OWN_NOISE_QUIET: [usize; 2] = [3, 2];
 const QUIET_SHARE: f64 = 0.04;
 const QUIET_TAU_S: f64 = 3000.0;
 
+/// Log score of an effect alone from which its starting points are too far from each other, and how many are refined at once.
+const SHARP: f64 = 150.0;
+const SHARP_MAX: usize = 3;
+
 /// Log posterior by which a null's noise must be improved upon for the search to begin again from there, and searches at most.
 const MISSED: f64 = 3.0;
 const SEARCHES_MAX: usize = 4;
@@ -213,6 +217,11 @@ impl Pool {
         let listed_ids: Vec<usize> = (0..library.listed).collect();
         let open_ids: Vec<usize> = (library.listed..entries.len()).collect();
         let mut listed = search::grow(frame, seen, &listed_ids, vec![Set::default()], SET_MAX);
+        let sharp = sharp(scene, frame, entries, seen, &listed_ids);
+        if !sharp.is_empty() {
+            listed.extend(search::grow(frame, seen, &listed_ids, sharp, SET_MAX));
+            search::distinct(&mut listed);
+        }
         listed.retain(|s| !s.members.is_empty());
         if stop() {
             return None;
@@ -259,6 +268,28 @@ impl Pool {
         let (listed, open) = shared_work::both(|| weigh(self.listed, count[0]), || weigh(self.opens, count[1]));
         Some((listed?, open?))
     }
+}
+
+/// Single effects so plain that what their starting points miss them by is taken for others: refined before they grow.
+fn sharp(scene: &Scene, frame: &Frame, entries: &[Entry], seen: &Seen, listed_ids: &[usize]) -> Vec<Set> {
+    let nothing = Set::default();
+    let chosen = nothing.chosen(frame);
+    let refines =
+        |i: &&usize| entries[**i].effect().is_some_and(|effect| effect.nonlinear.iter().any(|p| p.step > 0.0));
+    let ids: Vec<usize> = listed_ids.iter().filter(refines).copied().collect();
+    let alone = shared_work::map(&ids, |i| search::best_of_entry(seen, *i, &chosen));
+    let mut sharp: Vec<Set> = alone
+        .into_iter()
+        .map(|(score, member)| Set { members: vec![member], score })
+        .filter(|s| s.score > SHARP)
+        .collect();
+    search::distinct(&mut sharp);
+    sharp.truncate(SHARP_MAX);
+    shared_work::map(&sharp, |set| {
+        let mut set = set.clone();
+        search::refine(scene, frame, entries, &mut set);
+        set
+    })
 }
 
 /// Every entry alone, at the noise of the null.

@@ -4,6 +4,7 @@ mod bursts;
 mod dump;
 mod formula;
 mod lag;
+mod large;
 mod limits;
 mod listed;
 mod loud;

@@ -1,6 +1,6 @@
 //! The bias decays exponentially; amplitudes refer to the first instant of the simulation.
 
-use super::{Effect, Nonlinear, Shape, Theta, USUAL_OR_SMALL, push};
+use super::{Effect, Nonlinear, SELDOM_LARGE, Shape, Theta, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "time",
     mistaken_for: &["vent_leak", "temperature_bias", "a trend of density"],
     linear: &push(150.0, 20000.0),
-    scales: USUAL_OR_SMALL,
+    scales: SELDOM_LARGE,
     nonlinear: &[Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.2, range: [7.6, 13.5], ..Nonlinear::PLAIN }],
     grid,
     log_density,

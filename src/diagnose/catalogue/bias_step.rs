@@ -1,6 +1,6 @@
 //! The bias steps at an instant and stays.
 
-use super::{Effect, ONSET, Shape, Theta, USUAL_OR_SMALL, onsets, push};
+use super::{Effect, ONSET, SELDOM_LARGE, Shape, Theta, onsets, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "time_since_onset",
     mistaken_for: &["vent_leak", "a trend of density"],
     linear: &push(60.0, 2000.0),
-    scales: USUAL_OR_SMALL,
+    scales: SELDOM_LARGE,
     nonlinear: &[ONSET],
     grid,
     log_density,

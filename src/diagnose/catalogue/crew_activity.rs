@@ -1,6 +1,6 @@
 //! A shift between sleep and wake, wake minus sleep.
 
-use super::{Effect, Shape, USUAL_OR_SMALL, lasting, no_density, one_point, push};
+use super::{Effect, SELDOM_LARGE, Shape, lasting, no_density, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,7 +12,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "activity",
     mistaken_for: &["a daily temperature cycle"],
     linear: &push(20.0, 500.0),
-    scales: USUAL_OR_SMALL,
+    scales: SELDOM_LARGE,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,

@@ -1,6 +1,6 @@
 //! A push while a logged event of kind `evaporator` lasts.
 
-use super::{Effect, Shape, USUAL_OR_SMALL, lasting, no_density, one_point, push};
+use super::{Effect, SELDOM_LARGE, Shape, lasting, no_density, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,7 +12,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "time_since_event",
     mistaken_for: &["nearly nothing"],
     linear: &push(60.0, 1000.0),
-    scales: USUAL_OR_SMALL,
+    scales: SELDOM_LARGE,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,

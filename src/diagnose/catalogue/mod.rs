@@ -80,8 +80,8 @@ pub struct Effect {
     pub mistaken_for: &'static [&'static str],
     /// Linear coefficients, in the order of the columns.
     pub linear: &'static [Linear],
-    /// What the usual sizes may be multiplied by, each as likely.
-    pub scales: &'static [f64],
+    /// What the usual sizes may be multiplied by.
+    pub scales: &'static [Scale],
     /// Nonlinear parameters, in the order of [`Theta`].
     pub nonlinear: &'static [Nonlinear],
     /// Starting points over the whole prior range.
@@ -98,12 +98,28 @@ pub struct Effect {
     pub why: &'static str,
 }
 
+/// What usual sizes may be multiplied by, and how likely that is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    /// The factor.
+    pub factor: f64,
+    /// Its share of the prior.
+    pub share: f64,
+}
+
+const fn scale(factor: f64, share: f64) -> Scale {
+    Scale { factor, share }
+}
+
 /// Scales of a term that has one size.
-pub const ONE_SIZE: &[f64] = &[1.0];
+pub const ONE_SIZE: &[Scale] = &[scale(1.0, 1.0)];
 /// Scales of an effect that is of its usual size or well below it.
-pub const USUAL_OR_SMALL: &[f64] = &[1.0, 0.2];
+pub const USUAL_OR_SMALL: &[Scale] = &[scale(1.0, 0.5), scale(0.2, 0.5)];
+/// Scales of a push or a form that is seldom far above its usual size, and is then still itself: a prior that rules such sizes out gives
+/// them to whatever else comes near.
+pub const SELDOM_LARGE: &[Scale] = &[scale(1.0, 0.4875), scale(0.2, 0.4875), scale(8.0, 0.025)];
 /// Scales of an effect whose size nobody knows beforehand: its prior must not take from a large one what another form then gives back.
-pub const ANY_SIZE: &[f64] = &[1.0, 0.2, 5.0];
+pub const ANY_SIZE: &[Scale] = &[scale(1.0, 1.0 / 3.0), scale(0.2, 1.0 / 3.0), scale(5.0, 1.0 / 3.0)];
 
 /// A linear coefficient.
 pub struct Linear {

@@ -11,7 +11,7 @@ pub const EFFECT: Effect = Effect {
     source: "ground and flight calibrations differed by 3-14 %",
     covariate: "modelled_signal",
     mistaken_for: &["aerodynamic_drag"],
-    linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 1.5, whole: false }],
+    linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 0.75, whole: false }],
     scales: USUAL_OR_SMALL,
     nonlinear: &[Nonlinear { name: "axis", range: [0.0, 2.0], ..Nonlinear::PLAIN }],
     grid,

@@ -1,6 +1,6 @@
 //! A push while a logged event of kind `thruster` lasts.
 
-use super::{Effect, Shape, USUAL_OR_SMALL, added, no_density, one_point, push};
+use super::{Effect, SELDOM_LARGE, Shape, added, no_density, one_point, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,7 +12,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "time_since_event",
     mistaken_for: &["attitude deadband: jets fire at its edges"],
     linear: &push(150.0, 3000.0),
-    scales: USUAL_OR_SMALL,
+    scales: SELDOM_LARGE,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,

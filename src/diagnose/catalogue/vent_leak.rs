@@ -1,6 +1,6 @@
 //! A decaying push fixed in the body from an unlogged instant.
 
-use super::{Effect, Nonlinear, ONSET, Shape, Theta, USUAL_OR_SMALL, onsets, push};
+use super::{Effect, Nonlinear, ONSET, SELDOM_LARGE, Shape, Theta, onsets, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "time_since_onset",
     mistaken_for: &["bias_step", "bias_drift"],
     linear: &push(80.0, 3000.0),
-    scales: USUAL_OR_SMALL,
+    scales: SELDOM_LARGE,
     nonlinear: &[
         ONSET,
         Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, range: [5.7, 11.5], ..Nonlinear::PLAIN },

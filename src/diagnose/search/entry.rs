@@ -1,6 +1,6 @@
 //! What is searched: a catalogue effect or an open form, at its starting points, with its priors. Not here: whitening, and which is best.
 
-use crate::diagnose::catalogue::{Effect, LOG_PRIOR, Nonlinear, Shape, Theta, USUAL_OR_SMALL};
+use crate::diagnose::catalogue::{Effect, LOG_PRIOR, Nonlinear, SELDOM_LARGE, Scale, Shape, Theta};
 use crate::diagnose::open_form::SIZE_NG;
 use crate::diagnose::scene::Scene;
 use crate::math::shared_work;
@@ -60,9 +60,14 @@ impl Entry {
         }
     }
 
-    /// What the prior sizes may be multiplied by, each as likely.
-    pub(super) fn scales(&self) -> &'static [f64] {
-        self.effect().map_or(USUAL_OR_SMALL, |effect| effect.scales)
+    /// What the prior sizes may be multiplied by.
+    pub(super) fn scales(&self) -> &'static [Scale] {
+        self.effect().map_or(SELDOM_LARGE, |effect| effect.scales)
+    }
+
+    /// Log share of the prior that a factor on the prior sizes has.
+    pub(super) fn log_share_of(&self, factor: f64) -> f64 {
+        self.scales().iter().find(|scale| scale.factor == factor).map_or(0.0, |scale| scale.share.ln())
     }
 
     /// Usual size of coefficient `k` where nothing is believed of it beforehand.

@@ -18,7 +18,7 @@ pub use imitate::imitation;
 pub use refine::refine;
 pub use weigh::{Left, Weighed, fit_noise, residual, weigh_with_own_noise};
 
-use super::catalogue::{Shape, Theta};
+use super::catalogue::{Scale, Shape, Theta};
 use super::design::{Chosen, Column, Frame, Normal, OnAxis};
 use super::scene::{Axes, Scene};
 use crate::math::shared_work;
@@ -267,6 +267,10 @@ fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, m: &Member, theta: &The
     Some(point)
 }
 
+/// Sizes of a smaller share of the prior than this are tried where the usual size explains at least so much.
+const RARE: f64 = 0.1;
+const LARGE_FROM: f64 = 10.0;
+
 /// One way to add an entry to a set.
 #[derive(Clone, Copy)]
 struct Way {
@@ -299,9 +303,13 @@ pub fn best_of_entry(seen: &Seen, index: usize, chosen: &Chosen) -> (f64, Member
             });
             continue;
         }
-        let each = scales.len() * if narrow { 4 } else { 1 };
-        let log_share = entry.log_shares[i] - (each as f64).ln();
-        for &scale in scales {
+        let of_axes = if narrow { 4.0_f64 } else { 1.0 };
+        let usual = normal.gain(1.0);
+        for &Scale { factor: scale, share } in scales {
+            if share < RARE && usual < LARGE_FROM {
+                continue;
+            }
+            let log_share = entry.log_shares[i] + (share / of_axes).ln();
             ways.push(Way { gain: normal.gain(scale), log_share, point: i, axis: None, scale });
             if narrow {
                 let on = |axis| Way { gain: normal.gain_of(axis, scale), log_share, point: i, axis: Some(axis), scale };

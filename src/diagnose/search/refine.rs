@@ -50,7 +50,7 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         }
         if let Some(point) = point_at(scene, frame, entry, &set.members[i], &told.theta) {
             let m = &mut set.members[i];
-            let log_occam = told.log_share - (entry.scales().len() as f64).ln();
+            let log_occam = told.log_share + entry.log_share_of(scale);
             (m.theta, m.log_occam, m.theta_sigma, m.point) = (told.theta, log_occam, told.sigma, point);
         }
     }
@@ -76,7 +76,7 @@ const ARRIVED: f64 = 0.02;
 /// the effect.
 fn follow(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set, i: usize, exact_at: fn(&[f64]) -> Theta) {
     let entry = &entries[set.members[i].entry];
-    set.members[i].log_occam = -(entry.scales().len() as f64).ln();
+    set.members[i].log_occam = entry.log_share_of(set.members[i].scale);
     set.weigh(frame, entries);
     for round in 0..FOLLOWED {
         let first: usize = set.members[..i].iter().map(Member::linear).sum();
