@@ -3,7 +3,7 @@
 //! What it follows before the log of the temperature begins is one of two, as likely: what the log begins with, or the cycles of the
 //! orbit and the day.
 
-use super::{Effect, Linear, Nonlinear, Shape, Theta, USUAL_OR_SMALL};
+use super::{Effect, Linear, Nonlinear, SELDOM_LARGE, Shape, Theta};
 use crate::diagnose::case::HALF_WINDOW_S;
 use crate::diagnose::earlier::REACH_S;
 use crate::diagnose::measure::window_means;
@@ -22,7 +22,7 @@ pub const EFFECT: Effect = Effect {
         Linear { name: "slope_y_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, whole: false },
         Linear { name: "slope_z_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, whole: false },
     ],
-    scales: USUAL_OR_SMALL,
+    scales: SELDOM_LARGE,
     nonlinear: &[Nonlinear {
         name: "lag_s",
         unit: "s",
