@@ -1,6 +1,6 @@
 //! The atmosphere turns with the Earth: drag with co-rotation less drag without.
 
-use super::{Effect, Linear, ONE_SIZE, Shape, full, no_density, one_point};
+use super::{Effect, Linear, Shape, WHOLE_OR_PART, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -12,7 +12,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "latitude",
     mistaken_for: &["thermospheric_wind", "a yaw misalignment", "aerodynamic_drag"],
     linear: &[Linear { name: "fraction", unit: "1", size: 0.7, size_max: 2.0, whole: true }],
-    scales: ONE_SIZE,
+    scales: WHOLE_OR_PART,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,

@@ -113,6 +113,8 @@ const fn scale(factor: f64, share: f64) -> Scale {
 
 /// Scales of a term that has one size.
 pub const ONE_SIZE: &[Scale] = &[scale(1.0, 1.0)];
+/// Scales of a term that is left out or not: about all of it, or seldom a part.
+pub const WHOLE_OR_PART: &[Scale] = &[scale(1.0, 0.9), scale(10.0, 0.1)];
 /// Scales of an effect that is of its usual size or well below it.
 pub const USUAL_OR_SMALL: &[Scale] = &[scale(1.0, 0.5), scale(0.2, 0.5)];
 /// Scales of a push or a form that is seldom far above its usual size, and is then still itself: a prior that rules such sizes out gives
@@ -131,7 +133,7 @@ pub struct Linear {
     pub size: f64,
     /// A value beyond this is not credible, whatever the fit.
     pub size_max: f64,
-    /// The simulation lacks the whole term or nothing of it: the prior is about one, and only a value about one is credible.
+    /// The simulation lacks the whole term, or seldom a part of it: the prior is about one.
     pub whole: bool,
 }
 
@@ -147,8 +149,8 @@ pub struct Prior {
 /// What a term's own model (density, attitude, offset) may usually be off by where the whole of it is missing.
 const WHOLE_SIZE: f64 = 0.1;
 
-/// Fractions at which the whole of a term is missing: as far from one as its own model is off in storms, six usual sizes.
-const WHOLE: [f64; 2] = [0.4, 1.6];
+/// Fractions of a term that may be missing: nothing, and as far above one as its own model is off in storms, six usual sizes.
+const MISSING: [f64; 2] = [0.0, 1.6];
 
 impl Linear {
     /// Its prior.
@@ -164,8 +166,8 @@ impl Linear {
                 self.name, self.unit, self.size_max
             ));
         }
-        (self.whole && (value + doubt < WHOLE[0] || value - doubt > WHOLE[1]))
-            .then(|| format!("the term is left out or it is not, and {value:.2} of it is neither"))
+        (self.whole && (value + doubt < MISSING[0] || value - doubt > MISSING[1]))
+            .then(|| format!("it would need {value:.2} of the term, and a simulation lacks all of it at most"))
     }
 }
 

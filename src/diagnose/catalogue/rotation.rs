@@ -2,7 +2,7 @@
 
 use crate::units::NANO_G_M_S2;
 
-use super::{Effect, Linear, ONE_SIZE, Shape, full, no_density, one_point};
+use super::{Effect, Linear, Shape, WHOLE_OR_PART, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -14,7 +14,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "body_rate",
     mistaken_for: &["cg_offset"],
     linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0, whole: true }],
-    scales: ONE_SIZE,
+    scales: WHOLE_OR_PART,
     nonlinear: &[],
     grid: one_point,
     log_density: no_density,
