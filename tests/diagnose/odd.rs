@@ -294,3 +294,25 @@ fn a_recording_in_another_unit_is_told() {
     let [ours, far] = [1.0, 1e3].map(notes);
     assert!(!tells(&ours) && tells(&far), "{ours:?} {far:?}");
 }
+
+/// A push of 400 ng in one row of the simulation out of so many, as a firing that others fall between the rows of.
+fn kicked(every: usize, times: usize) -> Files {
+    with_lines("simulation.csv", |lines| {
+        for line in lines[1..].iter_mut().skip(every).step_by(every).take(times) {
+            let mut cells: Vec<String> = line.split(',').map(str::to_string).collect();
+            cells[1] = (cells[1].parse::<f64>().unwrap() + 400.0).to_string();
+            *line = cells.join(",");
+        }
+    })
+}
+
+#[test]
+fn a_simulation_that_is_too_coarse_here_and_there_is_compared_elsewhere_and_one_that_is_everywhere_is_refused() {
+    let here_and_there = read(&kicked(300, 10)).unwrap();
+    assert!((10..200).contains(&here_and_there.windows_too_rough), "{}", here_and_there.windows_too_rough);
+    let said = read(&kicked(30, 1000)).unwrap_err();
+    assert!(
+        said.starts_with("simulation.csv: it changes too fast from row to row") && said.contains("its grid too coarse"),
+        "{said}"
+    );
+}

@@ -273,10 +273,14 @@ impl Case {
             coarse(file, &kept)?;
         }
         let windows_in_holes = before - kept.clock_s.len();
-        kept = smooth_enough(&kept, &expected.simulation);
+        let in_common = kept.clock_s.len();
+        let (smooth, stretches) = smooth_enough(&kept, &expected.simulation);
+        kept = smooth;
         let common = kept.clock_s.len();
-        if common < WINDOWS_MIN {
-            return Err(CaseError::TooRough { file: files.simulation.clone(), common, needed: WINDOWS_MIN });
+        let needed = if stretches > ROUGH_STRETCHES_MAX { (ROUGH_SHARE * in_common as f64) as usize } else { 0 };
+        let needed = needed.max(WINDOWS_MIN);
+        if common < needed {
+            return Err(CaseError::TooRough { file: files.simulation.clone(), common, needed });
         }
         let windows_too_rough = before - windows_in_holes - kept.clock_s.len();
         let before = kept.clock_s.len();
@@ -329,9 +333,14 @@ fn outside_holes(recording: &Recording, grid: &[f64]) -> Recording {
 /// Share of the noise by which a straight line between grid points may miss the simulated signal.
 const ROUGHNESS_MAX: f64 = 0.3;
 
-/// The windows in which the simulation's grid resolves its own signal: between grid points it is known to about an eighth
+/// Rough stretches apart from each other up to which a simulation is rough there alone, as in changes of attitude; where there are more,
+/// so many rows must be smooth that what shows nowhere in a row, such as a firing between two, is small too.
+const ROUGH_STRETCHES_MAX: usize = 30;
+const ROUGH_SHARE: f64 = 0.9;
+
+/// The windows in which the simulation's grid resolves its own signal, and the stretches left out: between grid points it is known to about an eighth
 /// of the second difference, and where that is not small against the noise a comparison says nothing.
-fn smooth_enough(recording: &Recording, simulation: &Simulation) -> Recording {
+fn smooth_enough(recording: &Recording, simulation: &Simulation) -> (Recording, usize) {
     let grid = &simulation.clock_s;
     let noise: [f64; 3] = std::array::from_fn(|k| {
         let mut steps: Vec<f64> = recording.a_ng[k].windows(2).map(|w| (w[1] - w[0]).abs()).collect();
@@ -352,8 +361,9 @@ fn smooth_enough(recording: &Recording, simulation: &Simulation) -> Recording {
         let last = (grid.partition_point(|g| *g < t + HALF_WINDOW_S) + 1).min(grid.len());
         rough[first..last].iter().any(|r| *r)
     };
-    let keep: Vec<usize> = (0..recording.clock_s.len()).filter(|i| !touched(recording.clock_s[*i])).collect();
-    take(recording, &keep)
+    let touched: Vec<bool> = recording.clock_s.iter().map(|t| touched(*t)).collect();
+    let keep: Vec<usize> = (0..touched.len()).filter(|i| !touched[*i]).collect();
+    (take(recording, &keep), touched.chunk_by(|a, b| a == b).filter(|stretch| stretch[0]).count())
 }
 
 fn one_line(text: &str) -> String {
