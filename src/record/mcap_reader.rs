@@ -88,3 +88,37 @@ fn frame(message: &mcap::Message<'_>) -> Result<(String, Vec<u8>), RecordError> 
     let octets = STANDARD.decode(frame.octets.as_bytes()).map_err(|error| refuse(error.to_string()))?;
     Ok((frame.verdict.into_owned(), octets))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::io::Cursor;
+
+    use super::*;
+
+    /// A recording with these messages in place of frames.
+    fn recording(messages: &[&str]) -> Vec<u8> {
+        let mut file = Cursor::new(Vec::new());
+        let mut writer = mcap::Writer::new(&mut file).unwrap();
+        let channel_id = writer.add_channel(0, FRAME_TOPIC, "json", &BTreeMap::new()).unwrap();
+        for (sequence, message) in (0..).zip(messages) {
+            let header = mcap::records::MessageHeader { channel_id, sequence, log_time: 0, publish_time: 0 };
+            writer.write_to_known_channel(&header, message.as_bytes()).unwrap();
+        }
+        writer.finish().unwrap();
+        drop(writer);
+        file.into_inner()
+    }
+
+    #[test]
+    fn a_message_that_cannot_be_read_is_left_out_and_told() {
+        let good = r#"{"verdict":"fecf","octets":"AQID"}"#;
+        let link = LinkConfig::default();
+        let whole = dump(&recording(&[good, good]), &link).unwrap();
+        assert_eq!((whole.dump.len(), whole.faults.len()), (14, 0));
+        let part = dump(&recording(&[good, r#"{"verdict":"fecf","octets":"A!ID"}"#, "{", good]), &link).unwrap();
+        assert_eq!((part.dump, part.faults.len()), (whole.dump, 1));
+        assert!(part.faults[0].starts_with("2 frames of it cannot be read, the first: "), "{:?}", part.faults);
+        assert!(dump(&recording(&["{"]), &link).is_err() && dump(&recording(&[]), &link).is_err());
+    }
+}

@@ -97,13 +97,9 @@ async fn a_recording_holds_every_frame_and_reads_back_to_the_same_products() {
     let recorded = mcap_reader::dump(&octets, &LinkConfig::default()).unwrap();
     assert!(recorded.faults.is_empty(), "{:?}", recorded.faults);
     assert_eq!(undisturbed(&[recorded.dump]), products);
-    // Cut off, and with an octet altered, it is read as far as it goes, and that is said.
-    let said = |octets: &[u8]| mcap_reader::dump(octets, &LinkConfig::default()).unwrap().faults.concat();
-    let cut = said(&octets[..octets.len() / 2]);
+    // Cut off, it is read as far as it goes, and that is said.
+    let cut = mcap_reader::dump(&octets[..octets.len() / 2], &LinkConfig::default()).unwrap().faults.concat();
     assert!(cut.contains("frames are read of it and no more"), "{cut}");
-    let mut altered = octets.clone();
-    altered[octets.len() / 2] ^= 0x10;
-    assert_ne!(said(&altered), "");
     read_with_python(&paths[0], &octets);
     // What follows goes into a file of its own.
     let running = Running { service: Service::start(config(&dir)).await.unwrap(), dir };
