@@ -277,7 +277,7 @@ impl Case {
         let (smooth, stretches) = smooth_enough(&kept, &expected.simulation);
         kept = smooth;
         let common = kept.clock_s.len();
-        let needed = if stretches > ROUGH_STRETCHES_MAX { (ROUGH_SHARE * in_common as f64) as usize } else { 0 };
+        let needed = if stretches > ROUGH_STRETCHES_MAX { (SMOOTH_SHARE * in_common as f64) as usize } else { 0 };
         let needed = needed.max(WINDOWS_MIN);
         if common < needed {
             return Err(CaseError::TooRough { file: files.simulation.clone(), common, needed });
@@ -333,13 +333,14 @@ fn outside_holes(recording: &Recording, grid: &[f64]) -> Recording {
 /// Share of the noise by which a straight line between grid points may miss the simulated signal.
 const ROUGHNESS_MAX: f64 = 0.3;
 
-/// Rough stretches apart from each other up to which a simulation is rough there alone, as in changes of attitude; where there are more,
-/// so many rows must be smooth that what shows nowhere in a row, such as a firing between two, is small too.
+/// Rough stretches up to which a simulation is rough there alone: eight changes of attitude, each turned by one push and stopped by
+/// another, leave fewer; a deadband leaves a hundred and more.
 const ROUGH_STRETCHES_MAX: usize = 30;
-const ROUGH_SHARE: f64 = 0.9;
+/// Share of the windows that must be smooth where there are more of them: as many firings again may lie between two rows and show in none.
+const SMOOTH_SHARE: f64 = 0.9;
 
-/// The windows in which the simulation's grid resolves its own signal, and the stretches left out: between grid points it is known to about an eighth
-/// of the second difference, and where that is not small against the noise a comparison says nothing.
+/// The windows in which the simulation's grid resolves its own signal, and how many stretches are left out: between grid points it is
+/// known to about an eighth of the second difference, and where that is not small against the noise a comparison says nothing.
 fn smooth_enough(recording: &Recording, simulation: &Simulation) -> (Recording, usize) {
     let grid = &simulation.clock_s;
     let noise: [f64; 3] = std::array::from_fn(|k| {

@@ -267,7 +267,8 @@ fn point_at(scene: &Scene, frame: &Frame, entry: &Entry, m: &Member, theta: &The
     Some(point)
 }
 
-/// Sizes of a smaller share of the prior than this are tried where the usual size explains at least so much.
+/// Sizes of a smaller share of the prior than this are tried where the usual size gains at least so much: below it a size of eight times
+/// the usual one costs more than it can gain.
 const RARE: f64 = 0.1;
 const LARGE_FROM: f64 = 10.0;
 
