@@ -334,7 +334,7 @@ fn outside_holes(recording: &Recording, grid: &[f64]) -> Recording {
 const ROUGHNESS_MAX: f64 = 0.3;
 
 /// Rough stretches up to which a simulation is rough there alone: eight changes of attitude, each turned by one push and stopped by
-/// another, leave fewer; a deadband leaves a hundred and more.
+/// another, leave fewer; a deadband leaves some fifty to four hundred.
 const ROUGH_STRETCHES_MAX: usize = 30;
 /// Share of the windows that must be smooth where there are more of them: as many firings again may lie between two rows and show in none.
 const SMOOTH_SHARE: f64 = 0.9;
