@@ -97,7 +97,7 @@ impl<'a> Prepared<'a> {
         let table = null_table::false_alarm_probability(self.statistic, self.solution.null.slow_evidence);
         let (probability, source) = match reached {
             // Few replicates cannot show a small probability: then the table decides, and the bootstrap may only forbid.
-            Some(r) if r.least <= self.settings.claim_probability || r.probability > 3.0 * r.least => {
+            Some(r) if r.least <= verdict::asked(self.settings.claim_probability) || r.probability > 3.0 * r.least => {
                 (r.probability, Source::Bootstrap)
             }
             _ => (table, Source::NullTable),

@@ -83,7 +83,7 @@ pub fn recurring(s: &Scene) -> Vec<Recurring> {
     let [begins, ends] = changes_of_attitude(s);
     add("start of a change of attitude".into(), begins);
     add("end of a change of attitude".into(), ends);
-    for kind in s.case.kinds() {
+    for kind in s.case.kinds_tried() {
         let spans = s.case.spans(kind);
         add(format!("start of {kind}"), spans.iter().map(|x| x[0]).collect());
         // Ends that follow their starts by the same time are the same instants.

@@ -9,6 +9,9 @@ use super::design::{Column, Frame, Raw};
 use super::scene::{Axes, Scene};
 use super::search::{Entry, Family, Set};
 
+/// Standard error of a time that is taken from the log, s: it is kept by people.
+const LOG_S: f64 = 1.0;
+
 /// A fitted number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fitted {
@@ -34,7 +37,12 @@ pub struct MemberFit {
 /// Parameters of every member, the errors multiplied by `inflation`.
 pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, inflation: f64) -> Vec<MemberFit> {
     let (mean, linear_covariance) = set.coefficients(frame, entries);
-    let joint = joint_covariance(scene, frame, entries, set).unwrap_or(linear_covariance);
+    let onsets = onsets(scene, frame, entries, set);
+    let mut joint = joint_covariance(scene, frame, entries, set).unwrap_or_else(|| linear_covariance.clone());
+    for k in 0..mean.len() {
+        let moved: f64 = onsets.iter().flatten().map(|onset| onset.moves[k]).sum();
+        joint[(k, k)] = joint[(k, k)].max(linear_covariance[(k, k)] + moved);
+    }
     let mut next = 0;
     let mut theta_next = mean.len();
     let mut out = Vec::new();
@@ -64,13 +72,14 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
                 let curvature = joint.get((theta_next - 1, theta_next - 1)).map(|v| v.max(0.0).sqrt());
                 curvature.filter(|s| s.is_finite()).unwrap_or(m.theta_sigma[j]) * inflation
             } else {
-                1.0
+                LOG_S
             };
-            let sigma = if p.name == "onset_s" && p.step > 0.0 {
-                let scanned = onset_sigma(scene, frame, entries, set, out.len()) * inflation;
-                sigma.min(3.0 * scanned).max(scanned)
-            } else {
-                sigma
+            let sigma = match &onsets[out.len()] {
+                Some(onset) if p.name == "onset_s" => {
+                    let scanned = onset.sigma_s * inflation;
+                    sigma.min(3.0 * scanned).max(scanned)
+                }
+                _ => sigma,
             };
             let value = if p.log { m.theta[j].exp() } else { m.theta[j] };
             fit.parameters.push(Fitted {
@@ -104,10 +113,37 @@ const ONSET_FINEST_S: f64 = 1.0;
 /// Log posterior below its top that counts as low.
 const ONSET_LOW: f64 = 5.0;
 
-/// Standard error of the onset of member `i` about its fitted value, from its posterior: one window more or less can decide,
-/// so that the curvature at the peak says too little.
-fn onset_sigma(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: usize) -> f64 {
-    let Family::Listed(effect) = entries[set.members[i].entry].family else { return 0.0 };
+/// Errors of onsets beyond which sizes no longer follow them along a straight line, s: a window and its neighbour.
+const ONSET_STRAIGHT_S: f64 = 50.0;
+/// Onsets looked at for that, of a scan.
+const ONSET_LOOKS: usize = 15;
+
+/// What the posterior of an onset says.
+struct Onset {
+    /// Standard error about the fitted value.
+    sigma_s: f64,
+    /// By how much it moves the coefficients of the set, mean squares about their fitted values: a push that began anywhere in a hole of
+    /// the record had any size that dies down to what is seen after it.
+    moves: Vec<f64>,
+}
+
+/// Of every member, where its onset is fitted.
+fn onsets(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) -> Vec<Option<Onset>> {
+    let is_fitted = |i: usize| match entries[set.members[i].entry].family {
+        Family::Listed(effect) => effect.nonlinear.first().is_some_and(|p| p.name == "onset_s" && p.step > 0.0),
+        Family::Open(_) => false,
+    };
+    let one = |i: usize| is_fitted(i).then(|| onset(scene, frame, entries, set, i));
+    (0..set.members.len()).map(one).collect()
+}
+
+/// The onset of member `i`, from its posterior: one window more or less can decide, so that the curvature at the peak says too little.
+fn onset(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: usize) -> Onset {
+    let (fitted, _) = set.coefficients(frame, entries);
+    let still = vec![0.0; fitted.len()];
+    let Family::Listed(effect) = entries[set.members[i].entry].family else {
+        return Onset { sigma_s: 0.0, moves: still };
+    };
     let others = set.without(i);
     let chosen = others.chosen(frame);
     let sizes = set.members[i].sizes(entries);
@@ -130,23 +166,44 @@ fn onset_sigma(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: us
         let squares: f64 = posterior.iter().map(|s| s.0 * s.0 * (s.1 - top).exp()).sum();
         let low = |end: Option<&(f64, f64)>| end.is_none_or(|s| s.1 < top - ONSET_LOW);
         let sigma = if weight > 0.0 { (squares / weight).sqrt() } else { 0.0 };
-        (sigma, low(posterior.first()) && low(posterior.last()))
+        let enough = low(posterior.first()) && low(posterior.last());
+        let likely = posterior.into_iter().filter(|s| s.1 > top - ONSET_LOW).map(|(s, gain)| (s, (gain - top).exp()));
+        (sigma, enough, likely.collect::<Vec<(f64, f64)>>())
     };
     let mut half_width_s = ONSET_SCAN_S;
-    let (mut sigma, mut enough) = scan(half_width_s);
+    let (mut sigma, mut enough, mut likely) = scan(half_width_s);
     for _ in 1..ONSET_SCANS {
         if enough {
             break;
         }
         half_width_s *= 2.0;
-        (sigma, enough) = scan(half_width_s);
+        (sigma, enough, likely) = scan(half_width_s);
+    }
+    if sigma > ONSET_STRAIGHT_S {
+        return Onset { sigma_s: sigma, moves: moves(scene, frame, entries, set, i, &likely) };
     }
     // A posterior between two steps of the scan is looked at more closely.
     while sigma < half_width_s / f64::from(ONSET_SCAN_STEPS) && half_width_s > ONSET_FINEST_S {
         half_width_s *= 3.0 / f64::from(ONSET_SCAN_STEPS);
         sigma = scan(half_width_s).0;
     }
-    sigma
+    Onset { sigma_s: sigma, moves: still }
+}
+
+/// Mean squares by which the coefficients of a set move with the onset of member `i`; `likely` are its shifts and their weights.
+fn moves(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: usize, likely: &[(f64, f64)]) -> Vec<f64> {
+    let (fitted, _) = set.coefficients(frame, entries);
+    let mut squares = DVector::zeros(fitted.len());
+    let mut total = 0.0;
+    for (shift, weight) in likely.iter().step_by(likely.len().div_ceil(ONSET_LOOKS)) {
+        let mut moved = set.clone();
+        moved.members[i].theta[0] += shift;
+        moved.rewhiten(scene, frame, entries);
+        let away = moved.coefficients(frame, entries).0 - &fitted;
+        squares += away.component_mul(&away) * *weight;
+        total += weight;
+    }
+    if total > 0.0 { (squares / total).iter().copied().collect() } else { vec![0.0; fitted.len()] }
 }
 
 /// Covariance of all coefficients, then of all free nonlinear parameters, from the linearised joint fit.

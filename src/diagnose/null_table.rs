@@ -53,6 +53,9 @@ const OF_SLOW: [(f64, f64); 16] = [
     (2.54, 0.0009),
 ];
 
+/// The least probability that is told: no table and no bound is known to hold farther out.
+pub const LEAST: f64 = 1e-12;
+
 /// Whether a record is quiet, from the log likelihood of slow noise in it above that of hardly any when nothing is left out. An effect
 /// that slow noise could take makes a record look slow; then it is weighed as such.
 pub fn is_quiet(slow_evidence: f64) -> bool {
@@ -62,7 +65,7 @@ pub fn is_quiet(slow_evidence: f64) -> bool {
 /// Probability that a record of noise alone scores `statistic` or more, when slow noise is as likely in it as `slow_evidence` says.
 pub fn false_alarm_probability(statistic: f64, slow_evidence: f64) -> f64 {
     let table: &[(f64, f64)] = if is_quiet(slow_evidence) { &OF_QUIET } else { &OF_SLOW };
-    if statistic <= table[0].0 {
+    if statistic.is_nan() || statistic <= table[0].0 {
         return 1.0;
     }
     for pair in table.windows(2) {
@@ -73,7 +76,7 @@ pub fn false_alarm_probability(statistic: f64, slow_evidence: f64) -> f64 {
         }
     }
     let (last, p) = table[table.len() - 1];
-    (p * (-(statistic - last)).exp()).max(1e-12)
+    (p * (-(statistic - last)).exp()).max(LEAST)
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use super::error::CaseError;
 use super::noise::dot;
 use crate::ingest::wire::{PlaybackPart, PlaybackReader};
 use crate::math::rms::about_mean;
-use crate::pipeline::calibration::{Anomaly, Bias, Calibration, bias_law::PARAMETERS};
+use crate::pipeline::calibration::{Anomaly, Bias, Calibration, bias_law::PARAMETERS, saturation};
 use crate::pipeline::station::{Station, replay};
 use crate::pipeline::window::Window;
 use crate::pipeline::{PlaybackId, Product, Settings};
@@ -45,8 +45,12 @@ pub fn usable(station: &Station) -> Usable {
             conditions.push((window.centre_s(), window.temperature_c, product.range));
         }
     }
-    let fault =
-        |a: &Anomaly| Fault { kind: a.kind, span_s: [a.from.seconds(), a.to.seconds()], sentence: a.sentence.clone() };
+    let fault = |a: &Anomaly| Fault {
+        kind: a.kind,
+        span_s: [a.from.seconds(), a.to.seconds()],
+        sentence: a.sentence.clone(),
+        answered: saturation::is_answered(station.archive(), a),
+    };
     found.recording.faults = station.derived().anomalies.iter().map(fault).collect();
     if let Some(calibration) = station.calibration() {
         found.recording.bias_errors_ng = OARE_AXIS.map(|axis| bias_errors(calibration, axis, &conditions));

@@ -5,6 +5,8 @@
 
 use std::ops::Range;
 
+use nalgebra::DVector;
+
 use super::answer::HeldOut;
 use super::design::{Chosen, Column, Frame, Normal, Raw};
 use super::model::entry_columns;
@@ -193,17 +195,18 @@ impl<'a> Trial<'a> {
             let (train, test) = (self.part(train), self.part(test));
             let (on_train, on_test) = (self.on(&train), self.on(&test));
             gain += on_train.normal.and(&on_test.normal).gain(1.0) - on_train.normal.gain(1.0) + on_test.of_fixed;
-            let predicted = self.predict(&on_train);
+            let predicted = self.predict(&on_train.normal.posterior().0);
             let whiten =
                 |axes: &Axes| test.frame.column(&std::array::from_fn(|k| Some(pick(&axes[k], &test.index))), 1.0);
             let (p, s) = (whiten(&predicted), whiten(&self.signal));
             let missed = s.less(&p, 1.0);
-            let (signal, missed) = (s.dot(&s), missed.dot(&missed));
+            let signal = s.dot(&s);
             signal_energy += signal;
-            missed_energy += missed;
+            missed_energy += missed.dot(&missed);
             if on_train.normal.expected_miss(&on_test.normal) < PREDICTABLE * signal {
+                let missed = s.less(&whiten(&self.predict(&on_train.normal.free_mean())), 1.0);
                 predictable += signal;
-                unpredicted += missed;
+                unpredicted += missed.dot(&missed);
             }
             let left = test.frame.data.less(&p, 1.0);
             for k in 0..3 {
@@ -237,13 +240,12 @@ impl<'a> Trial<'a> {
         OnPart { normal: beside.normal(&linear), of_fixed: beside.log_evidence }
     }
 
-    /// The set's series over the whole record with amplitudes fitted to a part of it.
-    fn predict(&self, train: &OnPart) -> Axes {
+    /// The set's series over the whole record with amplitudes in units of their priors, as a part of it has them.
+    fn predict(&self, amplitudes: &DVector<f64>) -> Axes {
         let mut sum: Axes = std::array::from_fn(|_| vec![0.0; self.scene.schedule.len()]);
-        let mean = train.normal.posterior().0;
-        let mut mean = mean.iter();
+        let mut amplitudes = amplitudes.iter();
         for (raw, size) in &self.series {
-            add(&mut sum, raw, size.map_or(1.0, |size| size * mean.next().unwrap_or(&0.0)));
+            add(&mut sum, raw, size.map_or(1.0, |size| size * amplitudes.next().unwrap_or(&0.0)));
         }
         sum
     }

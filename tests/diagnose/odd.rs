@@ -130,6 +130,10 @@ fn what_nothing_can_be_is_refused_with_its_place() {
             "case.toml: `case.end_s` (10 s) must be after `case.start_s` (",
         ),
         (with_key("mass_kg", "104.0"), "ancillary.csv: `drag by density_kg_m3 and case.toml's mass_kg, area_m2"),
+        (
+            with_cell("ancillary.csv", None, "density_kg_m3", "2e-14"),
+            "ancillary.csv: `density_kg_m3 (at this height)` has a typical size of 2.000e-14, and kg/m3 between ",
+        ),
         (with_key("events", "5"), "case.toml: `ancillary.events` must be a text, found 5"),
         (with_key("includes", "[1]"), "case.toml: `simulation.includes` must be a list of texts, found [1]"),
         (

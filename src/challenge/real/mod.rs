@@ -66,11 +66,11 @@ pub struct Outcome {
 /// The sum of it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Score {
-    /// Draws with something removed, and how many were named rightly.
+    /// Of draws with something removed, how many were named rightly, and how many there are.
     pub removed: [usize; 2],
-    /// Draws with nothing removed, and how many were answered with nothing.
+    /// Of draws with nothing removed, how many were answered with nothing, and how many there are.
     pub nothing: [usize; 2],
-    /// Coefficients compared, and how many were within two standard errors.
+    /// Of the coefficients compared, how many were within two standard errors, and how many there are.
     pub coefficients: [usize; 2],
     /// Hash over all commitments, in order.
     pub commitment: String,

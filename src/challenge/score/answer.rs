@@ -133,9 +133,12 @@ pub fn within_two_sigma(truth: &Truth, answer: &Answer) -> Vec<(String, bool)> {
         for number in &effect.parameters {
             let Some(expected) = true_numbers.get(&number.name).and_then(serde_json::Value::as_f64) else { continue };
             let away = (number.value - expected).abs();
-            // A number taken from the log has no error of its own.
-            let exact = number.sigma == 0.0 && away <= 1e-6 * expected.abs();
-            checks.push((format!("{} {}.{}", truth.case, effect.id, number.name), exact || away <= 2.0 * number.sigma));
+            let within = away <= 2.0 * number.sigma;
+            // A time taken from the log is no estimate, and can only be that of another entry.
+            if within && effect.id == "mass_shift" && number.name == "onset_s" {
+                continue;
+            }
+            checks.push((format!("{} {}.{}", truth.case, effect.id, number.name), within));
         }
     }
     checks

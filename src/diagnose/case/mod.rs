@@ -1,11 +1,13 @@
 //! A case, read from its texts and checked. Not here: files (the command reads them), and what other kinds of recording hold.
 
+mod air;
 mod check;
 mod header;
 mod motion;
 mod read;
 mod spikes;
 
+use std::collections::BTreeMap;
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -22,6 +24,9 @@ pub const WINDOWS_MIN: usize = 200;
 pub const HALF_WINDOW_S: f64 = 25.0;
 /// From the centre of one window to that of the next, s.
 pub const WINDOW_STRIDE_S: f64 = 25.0;
+
+/// Kinds of entries of the log that are tried as a cause.
+pub const KINDS_TRIED: usize = 32;
 
 /// The texts of the files a case names.
 #[derive(Debug, Clone, Default)]
@@ -60,6 +65,8 @@ pub struct Fault {
     pub span_s: [f64; 2],
     /// One sentence an operator understands.
     pub sentence: String,
+    /// The instrument answered it as it is meant to, by a coarser range.
+    pub answered: bool,
 }
 
 /// What the baseline simulation expects, instantaneous.
@@ -153,6 +160,7 @@ impl Expectation {
         check::simulation(&header.files.simulation, &simulation)?;
         check::ancillary(&header.files.ancillary, &ancillary)?;
         check::drag(&header.files.ancillary, &header.vehicle, &ancillary)?;
+        air::agrees(&header.files.ancillary, &header, &ancillary)?;
         events.sort_by(|a, b| a.clock_s.total_cmp(&b.clock_s));
         Ok(Self { header, simulation, ancillary, events })
     }
@@ -190,6 +198,20 @@ impl Expectation {
         kinds.sort_unstable();
         kinds.dedup();
         kinds
+    }
+
+    /// The kinds that are tried as a cause, in order: those with most entries, [`KINDS_TRIED`] at most. Of a log with a kind to every entry
+    /// each would be another chance for noise.
+    pub fn kinds_tried(&self) -> Vec<&str> {
+        let mut count: BTreeMap<&str, usize> = BTreeMap::new();
+        for event in &self.events {
+            *count.entry(&event.kind).or_default() += 1;
+        }
+        let mut kinds: Vec<(&str, usize)> = count.into_iter().collect();
+        kinds.sort_by_key(|(_, entries)| std::cmp::Reverse(*entries));
+        kinds.truncate(KINDS_TRIED);
+        kinds.sort_unstable();
+        kinds.into_iter().map(|(kind, _)| kind).collect()
     }
 
     /// Events of one kind as spans `[start_s, end_s]`.
@@ -260,6 +282,7 @@ impl Case {
                 });
             }
         }
+        check::recording(&files.recording, &kept)?;
         let coarse = |file: &str, kept: &Recording| {
             let common = kept.clock_s.len();
             let coarse = CaseError::TooCoarse { file: file.into(), step_s: STEP_MAX_S, common, needed: WINDOWS_MIN };
@@ -346,7 +369,9 @@ fn smooth_enough(recording: &Recording, simulation: &Simulation) -> (Recording, 
     let noise: [f64; 3] = std::array::from_fn(|k| {
         let mut steps: Vec<f64> = recording.a_ng[k].windows(2).map(|w| (w[1] - w[0]).abs()).collect();
         steps.sort_by(f64::total_cmp);
-        steps[steps.len() / 2].max(1e-9)
+        // Of counts so coarse that most windows have the same, the least that they can differ by.
+        let middle = &steps[steps.len() / 2..];
+        middle.iter().copied().find(|step| *step > 0.0).unwrap_or(f64::INFINITY)
     });
     let rough: Vec<bool> = (0..grid.len())
         .map(|i| {

@@ -11,7 +11,7 @@ pub const EFFECT: Effect = Effect {
     source: "density models are 15-20 % off, 50-70 % in storms",
     covariate: "density",
     mistaken_for: &["scale_factor of the ram axis", "a bias in a fixed attitude", "atmosphere_corotation"],
-    linear: &[Linear { name: "fraction", unit: "1", size: 0.5, size_max: 3.0, whole: false }],
+    linear: &[Linear { name: "fraction", unit: "1", size: 0.5, size_max: 3.0, least: -1.0, ..Linear::PLAIN }],
     scales: USUAL_OR_SMALL,
     nonlinear: &[],
     grid: one_point,

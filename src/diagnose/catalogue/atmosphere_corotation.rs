@@ -11,7 +11,7 @@ pub const EFFECT: Effect = Effect {
     source: "standard; 5-30 ng cross-track",
     covariate: "latitude",
     mistaken_for: &["thermospheric_wind", "a yaw misalignment", "aerodynamic_drag"],
-    linear: &[Linear { name: "fraction", unit: "1", size: 0.7, size_max: 2.0, whole: true }],
+    linear: &[Linear { name: "fraction", unit: "1", size: 0.7, size_max: 2.0, ..Linear::WHOLE }],
     scales: WHOLE_OR_PART,
     nonlinear: &[],
     grid: one_point,

@@ -14,9 +14,9 @@ pub const EFFECT: Effect = Effect {
     covariate: "attitude",
     mistaken_for: &["a bias in a single LVLH attitude", "mass_shift", "rotation"],
     linear: &[
-        Linear { name: "dx_m", unit: "m", size: 0.6, size_max: 3.0, whole: false },
-        Linear { name: "dy_m", unit: "m", size: 0.6, size_max: 3.0, whole: false },
-        Linear { name: "dz_m", unit: "m", size: 0.6, size_max: 3.0, whole: false },
+        Linear { name: "dx_m", unit: "m", size: 0.6, size_max: 3.0, ..Linear::PLAIN },
+        Linear { name: "dy_m", unit: "m", size: 0.6, size_max: 3.0, ..Linear::PLAIN },
+        Linear { name: "dz_m", unit: "m", size: 0.6, size_max: 3.0, ..Linear::PLAIN },
     ],
     scales: USUAL_OR_SMALL,
     nonlinear: &[],

@@ -12,7 +12,7 @@ pub const EFFECT: Effect = Effect {
     source: "density bulge near 14 h local time; 30-50 % of drag",
     covariate: "local_time",
     mistaken_for: &["solar_radiation_pressure", "temperature_bias"],
-    linear: &[Linear { name: "amplitude", unit: "1", size: 0.4, size_max: 2.0, whole: false }],
+    linear: &[Linear { name: "amplitude", unit: "1", size: 0.4, size_max: 2.0, ..Linear::PLAIN }],
     scales: USUAL_OR_SMALL,
     nonlinear: &[],
     grid: one_point,

@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     source: "standard mechanics; 409 ng per metre radial at 300 km",
     covariate: "attitude",
     mistaken_for: &["cg_offset"],
-    linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0, whole: true }],
+    linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0, ..Linear::WHOLE }],
     scales: WHOLE_OR_PART,
     nonlinear: &[],
     grid: one_point,

@@ -16,9 +16,9 @@ pub const EFFECT: Effect = Effect {
     covariate: "time_since_event",
     mistaken_for: &["bias_step", "cg_offset"],
     linear: &[
-        Linear { name: "dx_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },
-        Linear { name: "dy_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },
-        Linear { name: "dz_m", unit: "m", size: 0.4, size_max: 3.0, whole: false },
+        Linear { name: "dx_m", unit: "m", size: 0.4, size_max: 3.0, ..Linear::PLAIN },
+        Linear { name: "dy_m", unit: "m", size: 0.4, size_max: 3.0, ..Linear::PLAIN },
+        Linear { name: "dz_m", unit: "m", size: 0.4, size_max: 3.0, ..Linear::PLAIN },
     ],
     scales: USUAL_OR_SMALL,
     nonlinear: &[Nonlinear { name: "onset_s", unit: "s", ..Nonlinear::PLAIN }],

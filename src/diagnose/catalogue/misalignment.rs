@@ -13,9 +13,9 @@ pub const EFFECT: Effect = Effect {
     covariate: "modelled_signal",
     mistaken_for: &["atmosphere_corotation"],
     linear: &[
-        Linear { name: "rx_rad", unit: "rad", size: 0.08, size_max: 0.6, whole: false },
-        Linear { name: "ry_rad", unit: "rad", size: 0.08, size_max: 0.6, whole: false },
-        Linear { name: "rz_rad", unit: "rad", size: 0.08, size_max: 0.6, whole: false },
+        Linear { name: "rx_rad", unit: "rad", size: 0.08, size_max: 0.6, ..Linear::PLAIN },
+        Linear { name: "ry_rad", unit: "rad", size: 0.08, size_max: 0.6, ..Linear::PLAIN },
+        Linear { name: "rz_rad", unit: "rad", size: 0.08, size_max: 0.6, ..Linear::PLAIN },
     ],
     scales: USUAL_OR_SMALL,
     nonlinear: &[],

@@ -133,6 +133,8 @@ pub struct Linear {
     pub size: f64,
     /// A value beyond this is not credible, whatever the fit.
     pub size_max: f64,
+    /// Below this it is no such effect any more.
+    pub least: f64,
     /// The simulation lacks the whole term, or seldom a part of it: the prior is about one.
     pub whole: bool,
 }
@@ -149,10 +151,16 @@ pub struct Prior {
 /// What a term's own model (density, attitude, offset) may usually be off by where the whole of it is missing.
 const WHOLE_SIZE: f64 = 0.1;
 
-/// Fractions of a term that may be missing: nothing, and as far above one as its own model is off in storms, six usual sizes.
-const MISSING: [f64; 2] = [0.0, 1.6];
+/// Most of a term that can be missing: as far above one as its own model is off in storms, six usual sizes.
+const MISSING_MAX: f64 = 1.6;
 
 impl Linear {
+    /// Of either sign, and no whole term.
+    const PLAIN: Self =
+        Self { name: "", unit: "", size: 1.0, size_max: f64::INFINITY, least: f64::NEG_INFINITY, whole: false };
+    /// A whole term.
+    const WHOLE: Self = Self { least: 0.0, whole: true, ..Self::PLAIN };
+
     /// Its prior.
     pub fn prior(&self) -> Prior {
         if self.whole { Prior { mean: 1.0, size: WHOLE_SIZE } } else { Prior { mean: 0.0, size: self.size } }
@@ -160,13 +168,20 @@ impl Linear {
 
     /// Why a size cannot be believed, if it cannot; `doubt` is what it may be out by.
     pub fn refuses(&self, value: f64, doubt: f64) -> Option<String> {
+        let needs = |bound: f64, which| {
+            let unit = Some(self.unit).filter(|unit| *unit != "1").map(|unit| format!(" {unit}")).unwrap_or_default();
+            Some(format!(
+                "it would need {} = {value:.3}{unit}, and {bound} is the {which} that can be believed",
+                self.name
+            ))
+        };
         if value.abs() > self.size_max {
-            return Some(format!(
-                "it would need {} = {value:.3} {}, and {} is the most that can be believed",
-                self.name, self.unit, self.size_max
-            ));
+            return needs(self.size_max, "most");
         }
-        (self.whole && (value + doubt < MISSING[0] || value - doubt > MISSING[1]))
+        if value + doubt < self.least {
+            return needs(self.least, "least");
+        }
+        (self.whole && value - doubt > MISSING_MAX)
             .then(|| format!("it would need {value:.2} of the term, and a simulation lacks all of it at most"))
     }
 }
@@ -317,9 +332,9 @@ pub const LOG_PRIOR: f64 = -4.0;
 /// Three coefficients of a push fixed in the body.
 pub const fn push(size_ng: f64, size_max_ng: f64) -> [Linear; 3] {
     [
-        Linear { name: "ax_ng", unit: "ng", size: size_ng, size_max: size_max_ng, whole: false },
-        Linear { name: "ay_ng", unit: "ng", size: size_ng, size_max: size_max_ng, whole: false },
-        Linear { name: "az_ng", unit: "ng", size: size_ng, size_max: size_max_ng, whole: false },
+        Linear { name: "ax_ng", unit: "ng", size: size_ng, size_max: size_max_ng, ..Linear::PLAIN },
+        Linear { name: "ay_ng", unit: "ng", size: size_ng, size_max: size_max_ng, ..Linear::PLAIN },
+        Linear { name: "az_ng", unit: "ng", size: size_ng, size_max: size_max_ng, ..Linear::PLAIN },
     ]
 }
 
@@ -353,6 +368,22 @@ fn share_of(scene: &Scene, spans: &[[f64; 2]]) -> Option<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A simulation cannot have more of a term than all of it, nor lack more: beyond what the value may be out by.
+    #[test]
+    fn sizes_that_cannot_be_are_refused_with_the_bound() {
+        let drag = &aerodynamic_drag::EFFECT.linear[0];
+        let refused = drag.refuses(-1.2, 0.1).unwrap();
+        assert_eq!(refused, "it would need fraction = -1.200, and -1 is the least that can be believed");
+        assert_eq!(drag.refuses(-1.05, 0.1), None);
+        assert!(drag.refuses(3.1, 0.1).is_some_and(|why| why.contains("3 is the most")));
+        let gradient = &gravity_gradient::EFFECT.linear[0];
+        assert!(gradient.refuses(-0.2, 0.1).is_some_and(|why| why.contains("0 is the least")));
+        assert_eq!([0.05, 1.0, 1.65].map(|fraction| gradient.refuses(fraction, 0.1)), [None, None, None]);
+        assert!(gradient.refuses(1.8, 0.1).is_some());
+        let offset = &cg_offset::EFFECT.linear[2];
+        assert!(offset.refuses(-7.0, 0.5).is_some_and(|why| why.contains("dz_m = -7.000 m")));
+    }
 
     #[test]
     fn every_entry_is_whole_and_named_once() {

@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     source: "standard mechanics; 0.02 deg/s at 10 m is 124 ng",
     covariate: "body_rate",
     mistaken_for: &["cg_offset"],
-    linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0, whole: true }],
+    linear: &[Linear { name: "fraction", unit: "1", size: 1.0, size_max: 3.0, ..Linear::WHOLE }],
     scales: WHOLE_OR_PART,
     nonlinear: &[],
     grid: one_point,

@@ -12,7 +12,7 @@ pub const EFFECT: Effect = Effect {
     covariate: "modelled_signal",
     mistaken_for: &["aerodynamic_drag"],
     // Three times the largest that was ever seen of such a sensor, 25 %; an axis that reads nothing is no scale factor.
-    linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 0.75, whole: false }],
+    linear: &[Linear { name: "fraction", unit: "1", size: 0.15, size_max: 0.75, ..Linear::PLAIN }],
     scales: USUAL_OR_SMALL,
     nonlinear: &[Nonlinear { name: "axis", range: [0.0, 2.0], ..Nonlinear::PLAIN }],
     grid,

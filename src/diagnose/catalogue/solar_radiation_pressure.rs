@@ -13,7 +13,7 @@ pub const EFFECT: Effect = Effect {
     source: "standard; 0.4-2 ng for the Orbiter, more with large panels",
     covariate: "sun_angle",
     mistaken_for: &["temperature_bias, which lags", "diurnal_bulge"],
-    linear: &[Linear { name: "coefficient", unit: "1", size: 4.0, size_max: 40.0, whole: false }],
+    linear: &[Linear { name: "coefficient", unit: "1", size: 4.0, size_max: 40.0, ..Linear::PLAIN }],
     scales: USUAL_OR_SMALL,
     nonlinear: &[],
     grid: one_point,

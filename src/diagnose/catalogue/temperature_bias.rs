@@ -18,9 +18,9 @@ pub const EFFECT: Effect = Effect {
     covariate: "temperature",
     mistaken_for: &["solar_radiation_pressure", "crew_activity", "bias_drift"],
     linear: &[
-        Linear { name: "slope_x_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, whole: false },
-        Linear { name: "slope_y_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, whole: false },
-        Linear { name: "slope_z_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, whole: false },
+        Linear { name: "slope_x_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, ..Linear::PLAIN },
+        Linear { name: "slope_y_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, ..Linear::PLAIN },
+        Linear { name: "slope_z_ng_per_c", unit: "ng/C", size: 60.0, size_max: 2000.0, ..Linear::PLAIN },
     ],
     scales: SELDOM_LARGE,
     nonlinear: &[Nonlinear {

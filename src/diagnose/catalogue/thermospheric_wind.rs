@@ -17,8 +17,8 @@ pub const EFFECT: Effect = Effect {
     covariate: "density",
     mistaken_for: &["atmosphere_corotation", "aerodynamic_drag"],
     linear: &[
-        Linear { name: "along_m_s", unit: "m/s", size: 300.0, size_max: 800.0, whole: false },
-        Linear { name: "cross_m_s", unit: "m/s", size: 300.0, size_max: 800.0, whole: false },
+        Linear { name: "along_m_s", unit: "m/s", size: 300.0, size_max: 800.0, ..Linear::PLAIN },
+        Linear { name: "cross_m_s", unit: "m/s", size: 300.0, size_max: 800.0, ..Linear::PLAIN },
     ],
     scales: USUAL_OR_SMALL,
     nonlinear: &[],

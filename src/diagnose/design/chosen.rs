@@ -85,6 +85,13 @@ impl Normal {
         }
     }
 
+    /// Posterior mean of the sizes in units of their priors, those taken far wider than they are, as in [`Self::expected_miss`].
+    pub fn free_mean(&self) -> DVector<f64> {
+        let n = self.y.len();
+        let wide = Cholesky::new(&self.a + DMatrix::identity(n, n) * WIDE);
+        wide.map_or_else(|| DVector::zeros(n), |c| c.solve(&(&self.y + &self.mean * WIDE)))
+    }
+
     /// Whitened energy that a prediction from this part of a record is expected to miss of the series fitted to all of it, in the
     /// part `unseen`: the posterior means of nested data differ by the fall of the posterior covariance. The priors are taken far
     /// wider than they are, so that an effect several times its usual size is not thought to be known before it is seen.

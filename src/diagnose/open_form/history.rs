@@ -17,7 +17,7 @@ pub(super) const PAUSE_TAUS_S: [f64; 4] = [300.0, 1000.0, 3000.0, 10_000.0];
 /// Times in which what is warmed, or a sensor, follows late, s.
 pub(super) const LATE_S: [f64; 3] = [1000.0, 3000.0, 10_000.0];
 
-/// Decays after instants, each forgetting the one before: exp(-(t - last)/tau).
+/// Decays after instants in order, each forgetting the one before: exp(-(t - last)/tau).
 pub(super) fn since(scene: &Scene, instants: &[(f64, f64)], tau_s: f64) -> Vec<f64> {
     let next = |n: usize| instants.get(n + 1).map_or(f64::INFINITY, |(t, _)| *t);
     decays(scene, instants, tau_s, next)
@@ -74,10 +74,11 @@ fn begins_once(s: &Scene, instants: &[(f64, f64)], tau_s: f64) -> bool {
 
 pub(super) fn events(c: &mut Collector) {
     let s = c.scene;
-    for kind in s.case.kinds() {
+    for kind in s.case.kinds_tried() {
         let spans = s.case.spans(kind);
         let starts: Vec<(f64, f64)> = spans.iter().map(|x| (x[0], 1.0)).collect();
-        let ends: Vec<(f64, f64)> = spans.iter().map(|x| (x[1], 1.0)).collect();
+        let mut ends: Vec<(f64, f64)> = spans.iter().map(|x| (x[1], 1.0)).collect();
+        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
         for tau in EVENT_TAUS_S {
             for (what, list) in
                 [("start", &starts), ("end", &ends)].iter().filter(|(_, list)| !begins_once(s, list, tau))

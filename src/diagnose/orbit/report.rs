@@ -305,7 +305,10 @@ fn held_out(problem: &Problem, first: &Level, last: &Level) -> Option<HeldOut> {
 fn limits(problem: &Problem, search: &Search, last: &Level) -> Vec<Limit> {
     let one = |(term, _): &(Term, f64)| {
         let each = (0..problem.arcs.len()).filter_map(|i| {
-            let estimate = *estimates(problem, last, i, *term).first()?;
+            let estimates = estimates(problem, last, i, *term);
+            if estimates.is_empty() {
+                return None;
+            }
             if term.is_known_size() {
                 // The term's size is known: the limit is what it would do to the orbit.
                 let fit = &last.fits[i];
@@ -315,7 +318,10 @@ fn limits(problem: &Problem, search: &Search, last: &Level) -> Vec<Limit> {
                     fit.partials.view((0, 6 + column), (n, 1)).norm() / (problem.arcs[i].fitted as f64).sqrt(),
                 );
             }
-            Some(estimate.value.abs() + 2.0 * estimate.sigma)
+            // Of a cosine and a sine, the amplitude.
+            let value: f64 = estimates.iter().map(|e| e.value.powi(2)).sum();
+            let sigma: f64 = estimates.iter().map(|e| e.sigma.powi(2)).sum();
+            Some(value.sqrt() + 2.0 * sigma.sqrt())
         });
         let unit = if term.is_known_size() { "m" } else { term.unit() };
         Limit { id: term.id().to_owned(), limit: median(each), unit: unit.to_owned() }

@@ -189,10 +189,11 @@ impl Set {
         }
     }
 
-    /// The same with every prior size so many times the usual one.
-    pub fn with_prior_sizes(&self, scale: f64) -> Self {
+    /// The same with every prior size so many times the usual one, or the one at which it was found where that is larger.
+    pub fn with_prior_sizes(&self, times: f64) -> Self {
         let mut other = self.clone();
         for m in other.members.iter_mut().filter(|m| !m.point.fixed) {
+            let scale = times * m.scale.max(1.0);
             m.point.columns = m.point.columns.iter().map(|column| column.times(scale / m.scale)).collect();
             m.scale = scale;
         }

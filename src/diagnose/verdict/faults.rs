@@ -1,4 +1,5 @@
-//! Faults of the instrument that the calibration found in a dump: told all of them, and named where the catalogue lists them.
+//! Faults of the instrument that the calibration found in a dump: told all of them, and named where the catalogue lists them and the
+//! instrument did not answer them as it is meant to.
 //!
 //! They are no matter of evidence against noise: the records themselves, their ranges and rails, say so, and the calibration has a
 //! bound of its own for false ones.
@@ -22,7 +23,8 @@ pub fn tell(answer: &mut Diagnosis, scene: &Scene) {
     }
     for (kind, name) in NAMED {
         let length_s = |fault: &Fault| fault.span_s[1] - fault.span_s[0];
-        let of_kind = faults.iter().filter(|fault| fault.kind == kind && !ends_another(fault, &faults));
+        let is_one = |fault: &&&Fault| fault.kind == kind && !fault.answered && !ends_another(fault, &faults);
+        let of_kind = faults.iter().filter(is_one);
         let Some(longest) = of_kind.max_by(|a, b| length_s(a).total_cmp(&length_s(b))) else { continue };
         let [from_s, to_s] = longest.span_s;
         let parameter =
@@ -37,6 +39,7 @@ pub fn tell(answer: &mut Diagnosis, scene: &Scene) {
             rms_ng: None,
         });
         answer.located.intervals.push(Interval { start_s: from_s, end_s: to_s, why: "fault of the instrument".into() });
+        answer.effects.sort_by(|a, b| b.posterior.total_cmp(&a.posterior));
         if FALSE_PER_MISSION < answer.false_alarm_probability {
             answer.false_alarm_probability = FALSE_PER_MISSION;
             answer.false_alarm_from = Some(Source::Calibration);

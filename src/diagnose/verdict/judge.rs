@@ -2,7 +2,7 @@
 
 use super::credible::simplest;
 use super::stands::{changes, fails, tried};
-use super::{EVIDENCE_SHARE, Proof};
+use super::{Proof, asked};
 use crate::diagnose::answer::Verdict;
 use crate::diagnose::scene::Scene;
 use crate::diagnose::search::Weighed;
@@ -40,7 +40,7 @@ pub fn judge<'a>(
         [listed.first().copied(), solution.listed.first(), solution.open.first()].map(|w| (height(w), w));
     let refused = best.0 - top.0 > REFUSED_MARGIN;
     let open_wins = open.0 > top.0.max(null);
-    let claimed = probability <= EVIDENCE_SHARE * claim && best.0.max(open.0) > null;
+    let claimed = probability <= asked(claim) && best.0.max(open.0) > null;
     let (verdict, chosen) = match (claimed, open_wins, refused) {
         (false, _, _) => (Verdict::Consistent, None),
         (true, true, _) => (Verdict::Unexplained, open.1),

@@ -26,13 +26,14 @@ use self::stands::tried;
 use self::unnamed::{hypothesis, of_failure, of_remains};
 use super::answer::{Diagnosis, Located, Source, Verdict};
 use super::bursts::OUT;
-use super::case::{Event, SPIKE};
+use super::case::{Event, KINDS_TRIED, SPIKE};
 use super::catalogue::Effect;
 use super::design::Frame;
 use super::instants::recurring;
 use super::locate;
 use super::model::{self, MemberFit};
 use super::noise::{AxisNoise, Contradicted, Resonance};
+use super::null_table;
 use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{Entry, Family, Member, Set, Weighed};
@@ -40,6 +41,12 @@ use super::solve::{Library, Solution};
 
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
 const EVIDENCE_SHARE: f64 = 0.8;
+
+/// False-alarm probability that the evidence alone must not exceed, of the one that a claim may have in all.
+pub fn asked(claim: f64) -> f64 {
+    EVIDENCE_SHARE * claim
+}
+
 /// What remains overturns an explanation when it has more than this share of the energy explained, and noise leaves as much so many
 /// times more rarely than is asked where nothing was explained: odds of twenty, as of any second effect. A name that holds is not
 /// taken back for what one record in a thousand has.
@@ -131,7 +138,7 @@ fn of_the_mismatch(
     let (verdict, least, remains) = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
     let tried = judged.on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
     let (of_evidence, by_remains) = (proof.probability / EVIDENCE_SHARE, least / (1.0 - EVIDENCE_SHARE));
-    let overall = of_evidence.min(by_remains).min(1.0);
+    let overall = of_evidence.min(by_remains).clamp(null_table::LEAST, 1.0);
     let false_alarm_from = Some(if by_remains < of_evidence { Source::Remains } else { proof.source });
     let statistic = Some(proof.statistic);
     let slow_evidence = Some(solution.null.slow_evidence);
@@ -221,6 +228,12 @@ fn of_windows(scene: &Scene) -> Vec<String> {
     if of_spikes > 0 {
         notes.push(format!(
             "{of_spikes} windows are left out: they stand alone, more than {SPIKE} standard deviations from those before and after"
+        ));
+    }
+    let kinds = scene.case.kinds().len();
+    if kinds > KINDS_TRIED {
+        notes.push(format!(
+            "the log has {kinds} kinds of entries: formulas are made of the {KINDS_TRIED} with most entries alone"
         ));
     }
     let [start_s, end_s] = scene.span_s();

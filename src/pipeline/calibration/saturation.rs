@@ -61,6 +61,20 @@ pub(super) fn told(runs: &[Run], corrections: &[RangeCorrection]) -> Vec<Anomaly
     found
 }
 
+/// Whether the instrument answered an axis at its rail as it is meant to, by a coarser range within the time that takes.
+pub fn is_answered(archive: &Archive, anomaly: &Anomaly) -> bool {
+    let soon = |clock: Clock| clock.plus_tenths(AUTORANGE_TENTHS + 10);
+    if anomaly.kind != AnomalyKind::Saturation || anomaly.to > soon(anomaly.from) {
+        return false;
+    }
+    let after = || archive.records_between(anomaly.from.plus_tenths(-10), soon(anomaly.to));
+    anomaly.axes.iter().all(|axis| {
+        let mut ranges = after().map(|record| record.ranges[axis.index()]);
+        // A is the coarsest and the least.
+        ranges.next().is_some_and(|first| ranges.any(|range| range < first))
+    })
+}
+
 /// The sample before, and what the instrument was doing.
 #[derive(Debug, Clone, Copy)]
 struct Last {
