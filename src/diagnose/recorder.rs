@@ -33,13 +33,19 @@ pub struct Usable {
     pub calibration: u32,
 }
 
+/// What may be said of a window that is used. Beyond the first and the last calibration the law of the bias is less certain, and what it
+/// leaves open there is a nuisance of the fit as everywhere: four hours at either end of a day are not given away.
+const FORGIVEN: Quality = Quality::RANGE_CORRECTED.with_if(Quality::EXTRAPOLATED, true);
+
 /// The windows of a station that a diagnosis may use.
 pub fn usable(station: &Station) -> Usable {
     let mut found = Usable { calibration: station.calibration().map_or(0, |c| c.version), ..Usable::default() };
     let mut conditions = Vec::new();
     for (window, product) in station.windows().zip(station.products()) {
-        let usable = product.quality == Quality::GOOD || product.quality == Quality::RANGE_CORRECTED;
-        if usable && product.mode == Mode::Normal && push(&mut found.recording, station, window, product) {
+        if product.quality.is_good_but_for(FORGIVEN)
+            && product.mode == Mode::Normal
+            && push(&mut found.recording, station, window, product)
+        {
             // Fowler, Noll and Vo's hash, a revision at a time: the windows come in one order.
             found.digest = (found.digest ^ product.revision.0).wrapping_mul(0x0000_0100_0000_01b3);
             conditions.push((window.centre_s(), window.temperature_c, product.range));

@@ -3,6 +3,7 @@
 //!
 //! Nonlinear parameters stay as fitted; amplitudes are fitted anew to what is not left out. It decides nothing.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use nalgebra::DVector;
@@ -185,7 +186,8 @@ impl<'a> Trial<'a> {
         let (mut signal_energy, mut missed_energy, mut gain) = (0.0, 0.0, 0.0);
         // The same of parts that the others can predict.
         let (mut predictable, mut unpredicted) = (0.0, 0.0);
-        let mut block_gain = vec![0.0; division.block.iter().max().map_or(1, |last| last + 1)];
+        // Of the blocks that hold a window: one that lies in a hole says nothing.
+        let mut block_gain: BTreeMap<usize, f64> = BTreeMap::new();
         let parts: Range<usize> = 0..division.part.iter().flatten().max().map_or(0, |last| last + 1);
         for left_out in parts {
             let (test, train): (Vec<usize>, Vec<usize>) = (0..n).partition(|i| division.part[*i] == Some(left_out));
@@ -212,14 +214,14 @@ impl<'a> Trial<'a> {
             for k in 0..3 {
                 let (b, a) = (test.frame.data.projected(k, &test.frame), left.projected(k, &test.frame));
                 for (place, i) in test.index.iter().enumerate() {
-                    block_gain[division.block[*i]] += 0.5 * (b[place].powi(2) - a[place].powi(2));
+                    *block_gain.entry(division.block[*i]).or_default() += 0.5 * (b[place].powi(2) - a[place].powi(2));
                     after[k][*i] -= predicted[k][*i];
                 }
             }
         }
-        let count = block_gain.len() as f64;
-        let mean = block_gain.iter().sum::<f64>() / count;
-        let spread = block_gain.iter().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        let count = block_gain.len().max(1) as f64;
+        let mean = block_gain.values().sum::<f64>() / count;
+        let spread = block_gain.values().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
         let held = HeldOut {
             scheme: division.scheme.clone(),
             before_rms_ng: std::array::from_fn(|k| rms_about_mean(&self.scene.residual_ng[k])),

@@ -52,6 +52,11 @@ impl Quality {
         self.0 == 0
     }
 
+    /// Whether there is nothing to say against it but these.
+    pub const fn is_good_but_for(self, others: Quality) -> bool {
+        self.0 & !others.0 == 0
+    }
+
     /// This set, with `other` when `condition` holds.
     pub const fn with_if(self, other: Quality, condition: bool) -> Quality {
         if condition { Quality(self.0 | other.0) } else { self }

@@ -42,22 +42,39 @@ fn sets_that_a_dump_cannot_tell_apart_have_an_observation_that_would() {
     assert!(observation.gain.is_some_and(|gain| gain > 0.0), "{observation:?}");
 }
 
-/// Records that name range C while the sensor is in range A, for an hour: the windows are corrected, and the fault is told with its span.
-#[test]
-fn records_that_name_a_wrong_range_are_an_effect_with_their_span() {
-    const SPAN_S: [f64; 2] = [40_000.0, 43_600.0];
+/// The diagnosis of a flight of twelve hours with a fault.
+fn with_fault(fault: Fault) -> Diagnosis {
     let mut config = MissionConfig::sts65(5, 12.0);
-    config.faults.push(Fault::RangeMisreport { from_clock_s: SPAN_S[0] as u32, seconds: 3600 });
+    config.faults.push(fault);
     let mission = Mission::new(config).unwrap();
     let link = LinkConfig::default();
     let passes = playbacks(&frames(mission.fly(), link), &link, &RecorderConfig::clean(), 5);
-    let mut files: Vec<(String, Vec<u8>)> = case_files(&mission, "wrong-range", "recording.dump")
+    let mut files: Vec<(String, Vec<u8>)> = case_files(&mission, "with-fault", "recording.dump")
         .unwrap()
         .into_iter()
         .map(|(name, text)| (name.to_string(), text.into_bytes()))
         .collect();
     files.push(("recording.dump".into(), passes.into_iter().flat_map(|pass| pass.octets).collect()));
-    let found = diagnose(&super::case(&files), &Settings::default()).unwrap();
+    diagnose(&super::case(&files), &Settings::default()).unwrap()
+}
+
+/// A bump drives an axis to its rail, and the instrument takes a coarser range: it is told, and no effect. At the rail in every range for
+/// half a minute is one.
+#[test]
+fn a_rail_that_autoranging_answers_is_told_and_no_effect() {
+    let bump = with_fault(Fault::Saturation { axis: 2, from_clock_s: 40_000.3, seconds: 2.0 });
+    assert_eq!((bump.verdict, bump.effects.len()), (Verdict::Consistent, 0), "{bump:?}");
+    assert!(bump.notes.iter().any(|note| note.contains("was at the rail for")), "{:?}", bump.notes);
+    let long = with_fault(Fault::Saturation { axis: 2, from_clock_s: 40_000.3, seconds: 30.0 });
+    let [effect] = &long.effects[..] else { panic!("{long:?}") };
+    assert_eq!((long.verdict, effect.id.as_str()), (Verdict::Explained, "saturation"));
+}
+
+/// Records that name range C while the sensor is in range A, for an hour: the windows are corrected, and the fault is told with its span.
+#[test]
+fn records_that_name_a_wrong_range_are_an_effect_with_their_span() {
+    const SPAN_S: [f64; 2] = [40_000.0, 43_600.0];
+    let found = with_fault(Fault::RangeMisreport { from_clock_s: SPAN_S[0] as u32, seconds: 3600 });
     let [effect] = &found.effects[..] else { panic!("{found:?}") };
     assert_eq!((found.verdict, effect.id.as_str()), (Verdict::Explained, "range_misreport"), "{found:?}");
     for (parameter, truth) in effect.parameters.iter().zip(SPAN_S) {

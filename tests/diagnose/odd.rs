@@ -320,3 +320,61 @@ fn a_simulation_that_is_too_coarse_here_and_there_is_compared_elsewhere_and_one_
         "{said}"
     );
 }
+
+#[test]
+fn an_axis_in_coarse_counts_is_taken_as_it_is() {
+    let (value, sigma, _) = drag(&files());
+    let coarse = with_lines("recording.csv", |lines| {
+        let place = lines[0].split(',').position(|name| name == "ay_ng").unwrap();
+        for line in &mut lines[1..] {
+            let mut cells: Vec<String> = line.split(',').map(str::to_string).collect();
+            cells[place] = (100.0 * (cells[place].parse::<f64>().unwrap() / 100.0).round()).to_string();
+            *line = cells.join(",");
+        }
+    });
+    let (beside, ..) = drag(&coarse);
+    assert!((beside - value).abs() < 2.0 * sigma, "{beside} for {value}");
+}
+
+#[test]
+fn an_axis_that_stands_still_in_the_span_asked_for_is_refused() {
+    let still = with_lines("recording.csv", |lines| {
+        let place = lines[0].split(',').position(|name| name == "ay_ng").unwrap();
+        for line in &mut lines[40..] {
+            let mut cells: Vec<&str> = line.split(',').collect();
+            cells[place] = "5";
+            *line = cells.join(",");
+        }
+    });
+    let (_, recording) = still.iter().find(|(name, _)| name == "recording.csv").unwrap();
+    let from_s = String::from_utf8_lossy(recording).lines().nth(60).unwrap().split(',').next().unwrap().to_string();
+    let mut still = still.clone();
+    let (_, toml) = still.iter_mut().find(|(name, _)| name == "case.toml").unwrap();
+    let text = String::from_utf8_lossy(toml).to_string();
+    let lines = text.lines().map(|line| match line.starts_with("start_s") {
+        true => format!("start_s = {from_s}"),
+        false => line.to_string(),
+    });
+    *toml = lines.collect::<Vec<String>>().join("\n").into_bytes();
+    let said = read(&still).err().unwrap_or_default();
+    assert!(said.starts_with("recording.csv: `ay_ng` is 5 in all "), "{said}");
+}
+
+/// A kind to every entry: each would be another chance for noise, and all of them minutes of work.
+#[test]
+fn a_log_of_very_many_kinds_is_tried_in_part_and_told() {
+    let (value, sigma, notes) = drag(&files());
+    assert!(!notes.iter().any(|note| note.contains("kinds of entries")), "{notes:?}");
+    let (beside, _, notes) = drag(&with_lines("events.csv", |lines| {
+        let first = lines[1].clone();
+        let at: f64 = first.split(',').next().unwrap().parse().unwrap();
+        for kind in 0..2000 {
+            for entry in 0..3 {
+                let at = at + 41.0 * f64::from(kind) + 9000.0 * f64::from(entry);
+                lines.push(format!("{at:.1},60.0,kind_{kind},"));
+            }
+        }
+    }));
+    assert!(notes.iter().any(|note| note.contains("kinds of entries: formulas are made of the 32")), "{notes:?}");
+    assert!((beside - value).abs() < 0.5 * sigma, "{beside} for {value}");
+}
