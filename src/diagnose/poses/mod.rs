@@ -1,7 +1,8 @@
 //! A triad held still in many poses: the magnitude of gravity is the same in all, so what the ideal triad lacks shows in
 //! it (Tedaldi et al. 2014: bias, scale factors, axes not at right angles; a rigid rotation cannot show).
 //!
-//! a = s T K (u - u0 - b), K = diag(1 + k), T upper triangular with the three small angles. The common scale s is a nuisance.
+//! a = s T K (u - u0 - b), K = diag(1 + k), T upper triangular with the three small angles: positive where two sensing axes make less
+//! than a right one. The common scale s is a nuisance.
 
 pub mod still;
 #[cfg(test)]
@@ -12,7 +13,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector, Dyn, Owned, Vector3};
 
 use self::still::{Pose, find_poses};
-use crate::diagnose::answer::{Located, Verdict};
+use crate::diagnose::answer::{Located, ParameterAnswer, Verdict};
 use crate::diagnose::keys::texts;
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, in_order, parameter, posterior,
@@ -162,7 +163,7 @@ fn acceleration(parts: &[Part], unknowns: &DVector<f64>, pose: &Pose) -> Vector3
     let raw = pose.mean * unknowns[0].exp() - bias;
     // What the recording has: an axis that reads (1 + k) times the truth is divided by it.
     let a = Vector3::from_fn(|k, _| raw[k] / (1.0 + scale[k]));
-    Vector3::new(a.x - angle.x * a.y + angle.y * a.z, a.y - angle.z * a.z, a.z)
+    Vector3::new(a.x - angle.x * a.y - angle.y * a.z, a.y - angle.z * a.z, a.z)
 }
 
 struct Problem<'a> {
@@ -371,15 +372,25 @@ fn unit(case: &MeasuredCase) -> String {
 fn effect(case: &MeasuredCase, fit: &Triad, part: Part, score: f64, was: f64) -> Effect {
     let values = fit.values(part);
     let unit = if part == Part::Bias { unit(case) } else { part.unit().to_owned() };
-    let parameters = (0..3).map(|k| parameter(part.names()[k], values[k].0, values[k].1, &unit)).collect();
+    let mut parameters: Vec<ParameterAnswer> =
+        (0..3).map(|k| parameter(part.names()[k], values[k].0, values[k].1, &unit)).collect();
     let largest = (0..3).max_by(|a, b| values[*a].0.abs().total_cmp(&values[*b].0.abs())).unwrap_or(0);
     let extra = match part {
         Part::Bias => format!(" In m/s^2 its largest is {:.4}.", values[largest].0 * fit.scale),
-        Part::Scale => " Fractions are beside the common scale and add to nothing.".to_owned(),
+        Part::Scale => {
+            " The fraction is that of the named axis against the other two; those of all three are beside the common \
+                        scale and add to nothing."
+                .to_owned()
+        }
         Part::NonOrthogonality => " A rigid rotation of the triad cannot show in a magnitude.".to_owned(),
     };
     let why = format!("With it |a| - g falls from {was:.5} to {:.5} m/s^2 rms.{extra}", fit.rms());
     let axis = (part == Part::Scale).then(|| ["x", "y", "z"][largest].to_owned());
+    if part == Part::Scale {
+        // The three add to nothing: what the axis has beyond the mean of the others is half as much again.
+        let (value, sigma) = values[largest];
+        parameters.insert(0, parameter("fraction", 1.5 * value, 1.5 * sigma, &unit));
+    }
     let (id, name) = (part.id().to_owned(), part.name().to_owned());
     Effect { id, name, posterior: posterior(score), parameters, axis, from_degree: None, why, rms: vec![fit.rms()] }
 }

@@ -28,7 +28,7 @@ impl Truth {
     fn reading(&self, a: &Vector3<f64>) -> Vector3<f64> {
         let z = a.z;
         let y = a.y + self.angle.z * z;
-        let x = a.x + self.angle.x * y - self.angle.y * z;
+        let x = a.x + self.angle.x * y + self.angle.y * z;
         let own = Vector3::new(x, y, z).component_mul(&(Vector3::repeat(1.0) + self.scale));
         own * self.per_m_s2 + self.bias + Vector3::repeat(self.zero)
     }

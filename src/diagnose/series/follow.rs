@@ -8,6 +8,8 @@ use super::read::{Axis, Series};
 pub enum Follows {
     /// A temperature (index of the covariate), late by a time constant in seconds.
     Temperature(usize, f64),
+    /// A temperature as it was so many seconds before.
+    Delayed(usize, f64),
     /// Exponential decay with this time constant in seconds from the start of the data.
     Drift(f64),
     /// A step at this time, s.
@@ -16,40 +18,58 @@ pub enum Follows {
     Scale,
     /// The reference, by so many seconds earlier than the series' own clock says.
     Offset(f64),
+    /// No effect of the catalogue: a form of a covariate, late by a time constant in seconds.
+    Form(Form, usize, f64),
+}
+
+/// A form of a covariate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// In proportion to it.
+    Linear,
+    /// To the square of its deviation from its mean.
+    Square,
 }
 
 impl Follows {
     /// The catalogue's name.
     pub fn id(&self) -> &'static str {
         match self {
-            Self::Temperature(..) => "temperature_bias",
+            Self::Temperature(..) | Self::Delayed(..) => "temperature_bias",
             Self::Drift(_) => "bias_drift",
             Self::Step(_) => "bias_step",
             Self::Scale => "scale_factor",
             Self::Offset(_) => "time_offset",
+            Self::Form(..) => "formula",
         }
     }
 
     /// The name for people.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::Temperature(..) => "A bias that follows temperature",
+            Self::Temperature(..) | Self::Delayed(..) => "A bias that follows temperature",
             Self::Drift(_) => "A decaying bias",
             Self::Step(_) => "A step of the bias",
             Self::Scale => "A scale factor against the reference",
             Self::Offset(_) => "A clock ahead of the reference's",
+            Self::Form(..) => "A formula",
         }
     }
 
     /// How many unknowns it is charged for: its coefficient, and what was looked for beside it.
     pub fn price(&self) -> f64 {
-        if matches!(self, Self::Temperature(_, 0.0) | Self::Scale) { 1.0 } else { 2.0 }
+        if matches!(self, Self::Temperature(_, 0.0) | Self::Form(.., 0.0) | Self::Scale) { 1.0 } else { 2.0 }
     }
 
     /// The number that does not enter linearly: a time constant or an instant.
     pub fn inner(&self) -> Option<f64> {
         match *self {
-            Self::Temperature(_, s) | Self::Drift(s) | Self::Step(s) | Self::Offset(s) => Some(s),
+            Self::Temperature(_, s)
+            | Self::Delayed(_, s)
+            | Self::Drift(s)
+            | Self::Step(s)
+            | Self::Offset(s)
+            | Self::Form(.., s) => Some(s),
             Self::Scale => None,
         }
     }
@@ -58,11 +78,30 @@ impl Follows {
     pub fn with_inner(self, s: f64) -> Self {
         match self {
             Self::Temperature(k, _) => Self::Temperature(k, s),
+            Self::Delayed(k, _) => Self::Delayed(k, s),
+            Self::Form(form, k, _) => Self::Form(form, k, s),
             Self::Drift(_) => Self::Drift(s),
             Self::Step(_) => Self::Step(s),
             Self::Offset(_) => Self::Offset(s),
             Self::Scale => Self::Scale,
         }
+    }
+}
+
+impl Form {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Linear, Self::Square];
+
+    fn of(self, values: &[f64]) -> Vec<f64> {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|x| if self == Self::Square { (x - mean).powi(2) } else { x - mean }).collect()
+    }
+
+    /// As a formula of a covariate.
+    pub fn words(self, covariate: &str, lag_s: f64) -> String {
+        let power = if self == Self::Square { "^2" } else { "" };
+        let late = if lag_s > 0.0 { format!(", {lag_s:.0} s late") } else { String::new() };
+        format!("({covariate} - <{covariate}>){power}{late}")
     }
 }
 
@@ -91,6 +130,8 @@ pub fn equation(series: &Series, axis: &Axis, model: &[Follows]) -> Equation {
     let none = || vec![0.0; t.len()];
     let column = |follows: &Follows| match follows {
         Follows::Temperature(k, lag_s) => late(t, &series.covariates[*k].values, *lag_s),
+        Follows::Delayed(k, lag_s) => t.iter().map(|now| at(t, &series.covariates[*k].values, now - lag_s)).collect(),
+        Follows::Form(form, k, lag_s) => late(t, &form.of(&series.covariates[*k].values), *lag_s),
         Follows::Drift(tau_s) => t.iter().map(|t| (-(t - series.t_s[0]) / tau_s).exp()).collect(),
         Follows::Step(at_s) => t.iter().map(|t| f64::from(u8::from(t >= at_s))).collect(),
         Follows::Scale => reference.clone().unwrap_or_else(none),

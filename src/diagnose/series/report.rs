@@ -1,10 +1,10 @@
 //! What a series was found to follow, in words and figures: one entry an axis, and all axes together. Not here: how it was
 //! found (`search`).
 
-use super::follow::Follows;
+use super::follow::{Follows, Form};
 use super::read::{Axis, Series};
 use super::search::{AxisFound, held_out, missed, regress};
-use crate::diagnose::answer::{Covariate, Interval, Located, ParameterAnswer, Verdict};
+use crate::diagnose::answer::{Covariate, Hypothesis, Interval, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level, Limit, in_order, parameter, posterior,
 };
@@ -27,7 +27,9 @@ pub fn answer(case: &MeasuredCase, series: &Series, found: &[AxisFound]) -> Answ
         (true, true) => Verdict::Unexplained,
         (true, false) => Verdict::Consistent,
     };
-    let weakest = measured.iter().flat_map(|row| row.found.effects.iter().map(|e| e.1)).fold(f64::INFINITY, f64::min);
+    let of_effects = measured.iter().flat_map(|row| row.found.effects.iter().map(|e| e.1));
+    let of_forms = measured.iter().filter_map(|row| row.found.form.as_ref().map(|form| form.1));
+    let weakest = of_effects.chain(of_forms).fold(f64::INFINITY, f64::min);
     let refused = measured.iter().map(|row| row.found.refused).fold(0.0, f64::max);
     let score = if weakest.is_finite() { weakest } else { refused };
     let notes = arcs.iter().filter_map(|arc| arc.note.as_ref().map(|note| format!("{}: {note}", arc.id)));
@@ -38,7 +40,11 @@ pub fn answer(case: &MeasuredCase, series: &Series, found: &[AxisFound]) -> Answ
         false_alarm_probability: (-0.5 * score).exp().clamp(1e-12, 1.0),
         located: located(&measured),
         alternatives: Vec::new(),
-        hypothesis: None,
+        hypothesis: measured
+            .iter()
+            .filter_map(|row| row.hypothesis())
+            .next()
+            .filter(|_| verdict == Verdict::Unexplained),
         unit: measured.first().map_or(String::new(), |row| row.axis.unit.clone()),
         fit: fit(&measured),
         upper_limits: rows.iter().filter_map(Row::limit).collect(),
@@ -64,6 +70,7 @@ impl Row<'_> {
             let (was, is) = (self.found.fits[i].rms(), self.found.fits[i + 1].rms());
             let with = match follows {
                 Follows::Temperature(k, _) => format!(" Covariate: {}.", self.series.covariates[*k].name),
+                Follows::Delayed(k, _) => format!(" Covariate: {}, delayed.", self.series.covariates[*k].name),
                 _ => String::new(),
             };
             let r2 = 1.0 - (is / was).powi(2);
@@ -83,7 +90,7 @@ impl Row<'_> {
         // The catalogue's own names carry the unit they are fixed to.
         let ng = if unit == "ng" { "_ng" } else { "" };
         match follows {
-            Follows::Temperature(k, lag_s) => {
+            Follows::Temperature(k, lag_s) | Follows::Delayed(k, lag_s) => {
                 let per = &self.series.covariates[k].unit;
                 let named = if unit == "ng" && per == "C" { "_ng_per_c" } else { "" };
                 vec![
@@ -99,6 +106,7 @@ impl Row<'_> {
             }
             Follows::Scale => vec![parameter("fraction", value, sigma, "1")],
             Follows::Offset(_) => vec![parameter("offset_s", value, sigma, "s")],
+            Follows::Form(..) => Vec::new(),
         }
     }
 
@@ -110,15 +118,21 @@ impl Row<'_> {
         let note = slow.then(|| {
             let removed = 100.0 * (1.0 - (last.rms() / first.rms()).powi(2));
             format!(
-                "{:.3e} {} rms stays, {left:.0} times the scatter from block to block ({removed:.0} % of the variance is explained): something slow is left, and nothing in the catalogue accounts for it.",
+                "{:.3e} {} rms stays, {left:.0} times the scatter from block to block ({removed:.0} % of the variance is explained): something slow is left that no covariate accounts for, and is taken as noise.",
                 last.rms(),
                 self.axis.unit,
             )
         });
-        let verdict = match (effects.is_empty(), slow) {
+        let note = match self.hypothesis() {
+            Some(hypothesis) => {
+                Some(format!("it follows {} better than any effect of the catalogue.", hypothesis.formula))
+            }
+            None => note,
+        };
+        let verdict = match (effects.is_empty(), &self.found.form) {
             (false, _) => Verdict::Explained,
-            (true, true) => Verdict::Unexplained,
-            (true, false) => Verdict::Consistent,
+            (true, Some(_)) => Verdict::Unexplained,
+            (true, None) => Verdict::Consistent,
         };
         ArcAnswer {
             id: self.axis.column.clone(),
@@ -132,6 +146,28 @@ impl Row<'_> {
             masked: self.series.masked,
             note,
         }
+    }
+
+    /// The formula that it follows, where no effect of the catalogue comes near.
+    fn hypothesis(&self) -> Option<Hypothesis> {
+        let (Follows::Form(form, k, lag_s), _, fit) = self.found.form.as_ref()? else { return None };
+        let covariate = &self.series.covariates[*k];
+        let (value, sigma) = *fit.coefficients.last()?;
+        let power = if *form == Form::Square { "^2" } else { "" };
+        let per = format!("{}/{}{power}", self.axis.unit, covariate.unit);
+        Some(Hypothesis {
+            formula: format!("({value:.3e} +- {sigma:.1e}) {per} x {}", form.words(&covariate.name, *lag_s)),
+            axis: self.axis.name.clone(),
+            unit: self.axis.unit.clone(),
+            location: format!(
+                "In {}, {:.3e} to {:.3e} {} rms: what follows {} so is no effect of the catalogue.",
+                self.axis.column,
+                self.found.last().rms(),
+                fit.rms(),
+                self.axis.unit,
+                covariate.name
+            ),
+        })
     }
 
     /// How large a slope could hide, where none is claimed.
@@ -270,7 +306,7 @@ impl Row<'_> {
 fn located(measured: &[&Row<'_>]) -> Located {
     let covariates = measured.iter().flat_map(|row| {
         let follows = |f: &Follows| match f {
-            Follows::Temperature(k, _) => row.series.covariates[*k].name.clone(),
+            Follows::Temperature(k, _) | Follows::Delayed(k, _) => row.series.covariates[*k].name.clone(),
             other => other.id().to_owned(),
         };
         let one = move |(f, score): &(Follows, f64)| Covariate {

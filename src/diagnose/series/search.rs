@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::follow::{Equation, Follows, equation};
+use super::follow::{Equation, Follows, Form, equation};
 use super::read::{Axis, Series};
 use super::red::{self, Beat};
 use crate::diagnose::measured::{MeasuredCase, MeasuredError};
@@ -19,6 +19,8 @@ const LAGS: [f64; 8] = [0.0015, 0.003, 0.006, 0.0125, 0.025, 0.05, 0.1, 0.2];
 const DRIFTS: [f64; 4] = [0.05, 0.15, 0.5, 5.0];
 /// The likeliest instants of a step that are weighed in full.
 const STEPS: usize = 3;
+/// The longest delay tried, as a part of the record.
+const DELAY_MAX: f64 = 0.1;
 /// Offsets tried against a reference, in samples, either way.
 const OFFSETS: [f64; 11] = [0.0, 1.0, 2.0, 4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0];
 /// Held-out prediction leaves out blocks of this length in turn, s, or of an eighth of the shortest span.
@@ -26,6 +28,8 @@ const HELD_OUT_S: f64 = 6.0 * 3600.0;
 /// Where means are rarer, so many of them together.
 const HELD_OUT_BLOCKS_MIN: f64 = 4.0;
 const EFFECTS_MAX: usize = 4;
+/// Evidence by which a form must be above all effects found: twice the logarithm of odds of twenty.
+const FORM_MARGIN: f64 = 6.0;
 const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// Least squares of one axis on a constant per span and some effects.
@@ -106,6 +110,8 @@ pub struct AxisFound {
     pub fits: Vec<Regression>,
     /// Evidence of the strongest candidate refused.
     pub refused: f64,
+    /// A form that no effect of the catalogue is, where it is better than all of them: with its evidence and its fit.
+    pub form: Option<(Follows, f64, Regression)>,
 }
 
 impl AxisFound {
@@ -137,6 +143,11 @@ pub fn search(series: &Series, axis: &Axis, included: &[Follows]) -> AxisFound {
         refined(series, axis, &mut model, included.len(), &beat);
         refused = 0.0;
     }
+    let form = if still { None } else { best_form(series, axis, included, scores.iter().sum(), &beat) };
+    if form.is_some() {
+        model.truncate(included.len());
+        scores.clear();
+    }
     let mut fits: Vec<Regression> =
         (0..=scores.len()).map(|n| regress(series, axis, &model[..included.len() + n])).collect();
     let sigma = |i: usize| inner_sigma(series, axis, &model, i, &beat);
@@ -144,7 +155,41 @@ pub fn search(series: &Series, axis: &Axis, included: &[Follows]) -> AxisFound {
     let last = scores.len();
     widen(series, axis, &model, included.len(), &inner_sigma, &mut fits[last].coefficients);
     let effects = model[included.len()..].iter().copied().zip(scores).collect();
-    AxisFound { included: included.to_vec(), effects, inner_sigma, fits, refused }
+    AxisFound { included: included.to_vec(), effects, inner_sigma, fits, refused, form }
+}
+
+/// The form that an axis follows, where its evidence is that of an effect and above all that were found (`listed`), by odds of twenty.
+fn best_form(
+    series: &Series,
+    axis: &Axis,
+    included: &[Follows],
+    listed: f64,
+    beat: &Beat,
+) -> Option<(Follows, f64, Regression)> {
+    let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
+    let (now, before) = (likelihood(series, axis, included, beat), held_out(series, axis, included));
+    let charge = (axis.values.len() as f64).ln();
+    let with = |form: Follows| [included, &[form]].concat();
+    let score = |form: Follows| likelihood(series, axis, &with(form), beat) - now - form.price() * charge;
+    let mut scored: Vec<(Follows, f64)> = Vec::new();
+    for (k, covariate) in series.covariates.iter().enumerate() {
+        for form in Form::ALL.into_iter().filter(|form| *form == Form::Square || !covariate.is_temperature()) {
+            let lags = [0.0].into_iter().chain(LAGS.map(|part| part * span_s));
+            let forms: Vec<(Follows, f64)> =
+                lags.map(|lag_s| Follows::Form(form, k, lag_s)).map(|form| (form, score(form))).collect();
+            let immediate = forms[0].1;
+            let earned =
+                |(i, (_, score)): &(usize, &(Follows, f64))| *i == 0 || *score > immediate.max(0.0) + LATE_MARGIN;
+            scored.extend(forms.iter().enumerate().filter(earned).map(|(_, scored)| *scored));
+        }
+    }
+    scored.retain(|(_, score)| *score >= SCORE_MIN.max(listed + FORM_MARGIN));
+    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let (form, score) = scored.into_iter().find(|(form, _)| held_out(series, axis, &with(*form)) < before)?;
+    let mut model = with(form);
+    refined(series, axis, &mut model, included.len(), beat);
+    let fit = regress(series, axis, &model);
+    Some((model[included.len()], score, fit))
 }
 
 struct Step {
@@ -158,7 +203,8 @@ fn step(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Step {
     let charge = (axis.values.len() as f64).ln();
     let mut scored: Vec<(Follows, f64)> = Vec::new();
     let steps = if taken("bias_step") { Vec::new() } else { likely_steps(series, axis, model, beat) };
-    for candidate in candidates(series, axis).into_iter().chain(steps).filter(|c| !taken(c.id())) {
+    let delays = if taken("temperature_bias") { Vec::new() } else { likely_delays(series, axis, model, beat) };
+    for candidate in candidates(series, axis).into_iter().chain(steps).chain(delays).filter(|c| !taken(c.id())) {
         let mut with = model.to_vec();
         with.push(candidate);
         let score = likelihood(series, axis, &with, beat) - now - candidate.price() * charge;
@@ -170,7 +216,7 @@ fn step(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Step {
     let immediate: Vec<(Follows, f64)> =
         scored.iter().filter(|(f, _)| matches!(f, Follows::Temperature(_, 0.0))).copied().collect();
     let earned = |(follows, score): &(Follows, f64)| match follows {
-        Follows::Temperature(k, lag) if *lag > 0.0 => {
+        Follows::Temperature(k, lag) | Follows::Delayed(k, lag) if *lag > 0.0 => {
             immediate.iter().all(|(f, s)| *f != Follows::Temperature(*k, 0.0) || *score > s + LATE_MARGIN)
         }
         _ => true,
@@ -222,6 +268,23 @@ fn likely_steps(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) ->
     tried.iter().take(STEPS).map(|(i, _)| Follows::Step(between(*i))).collect()
 }
 
+/// The likeliest delays of every temperature, each multiple of a beat tried in the noise that the model has without one.
+fn likely_delays(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Vec<Follows> {
+    let without = equation(series, axis, model);
+    let (noise, _) = red::best(&without.values, &design(series, &without), beat);
+    let longest = (DELAY_MAX * series.t_s.len() as f64) as usize;
+    let temperatures = series.covariates.iter().enumerate().filter(|(_, covariate)| covariate.is_temperature());
+    let of_one = |(k, _)| {
+        let at = |beats: usize| {
+            let follows = Follows::Delayed(k, beats as f64 * series.beat_s());
+            let equation = equation(series, axis, &[model, &[follows]].concat());
+            (follows, red::in_noise(&equation.values, &design(series, &equation), beat, noise))
+        };
+        (1..=longest).map(at).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(follows, _)| follows)
+    };
+    temperatures.filter_map(of_one).collect()
+}
+
 /// Move the inner number of every effect found to where the likelihood is best, one after the other.
 fn refined(series: &Series, axis: &Axis, model: &mut [Follows], from: usize, beat: &Beat) {
     let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
@@ -231,7 +294,9 @@ fn refined(series: &Series, axis: &Axis, model: &mut [Follows], from: usize, bea
             likelihood(series, axis, model, beat)
         };
         match model[i] {
-            Follows::Temperature(_, s) | Follows::Drift(s) if s > 0.0 => {
+            Follows::Temperature(_, s) | Follows::Delayed(_, s) | Follows::Drift(s) | Follows::Form(.., s)
+                if s > 0.0 =>
+            {
                 let log = golden(s.ln() - 0.7, s.ln() + 0.7, 14, &mut |x| at(model, x.exp()));
                 model[i] = model[i].with_inner(log.exp());
             }
