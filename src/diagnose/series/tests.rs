@@ -1,7 +1,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 
-use super::follow::Follows;
+use super::follow::{Follows, Form};
 use super::read::{Axis, CovariateSeries, Series};
 use super::search::{AxisFound, regress, search};
 
@@ -14,8 +14,12 @@ fn series(rng: &mut ChaCha12Rng) -> Series {
     let t_s: Vec<f64> = (0..BLOCKS).map(|i| 1_000.0 * i as f64).collect();
     let wander = red(rng, 60.0, 0.0);
     let values = t_s.iter().zip(wander).map(|(t, w)| 25.0 + 2.0 * (t / 13_751.0).sin() + 0.5 * w).collect();
-    let covariates = vec![CovariateSeries { name: "temperature".into(), unit: "C".into(), values }];
+    let covariates = vec![covariate("temperature", "C", values)];
     Series { t_s, span: vec![0; BLOCKS], spans: 1, axes: Vec::new(), covariates, masked: 0 }
+}
+
+fn covariate(name: &str, unit: &str, values: Vec<f64>) -> CovariateSeries {
+    CovariateSeries { name: name.into(), unit: unit.into(), values }
 }
 
 fn axis(values: Vec<f64>) -> Axis {
@@ -58,11 +62,15 @@ fn alarms_in_red_noise(seeds: u64) {
     let mut alarms = Vec::new();
     for seed in 0..seeds {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
-        let series = series(&mut rng);
+        let mut series = series(&mut rng);
         let memory = MEMORIES[seed as usize % 5];
         let values = red(&mut rng, memory, [0.0, 0.3][seed as usize / 5 % 2]);
+        for (name, unit, memory) in [("humidity", "%", 40.0), ("pressure", "hPa", 150.0)] {
+            series.covariates.push(covariate(name, unit, red(&mut rng, memory, 0.1)));
+        }
         let found = search(&series, &axis(values), &[]);
         alarms.extend(found.effects.into_iter().map(|(effect, score)| (seed, memory, effect, score)));
+        alarms.extend(found.form.map(|(form, score, _)| (seed, memory, form, score)));
     }
     println!("{} false alarms in {seeds}: {alarms:?}", alarms.len());
     assert!(alarms.len() as u64 <= seeds / 100, "{alarms:?}");
@@ -178,6 +186,47 @@ fn a_late_response_gives_its_lag() {
         within += usize::from((lag - 6_000.0).abs() < 2.0 * found.inner_sigma[0] && (slope - 1.2).abs() < 2.0 * sigma);
     }
     assert!(named == 10 && within >= 8, "{named} named, {within} within");
+}
+
+/// A temperature that changes from hour to hour, and what follows it as it was an hour and a half before.
+#[test]
+fn a_delayed_response_gives_its_delay() {
+    const DELAY: usize = 9;
+    let (mut named, mut within) = (0, 0);
+    for seed in 0..10 {
+        let mut rng = ChaCha12Rng::seed_from_u64(seed);
+        let mut series = series(&mut rng);
+        series.covariates[0].values = red(&mut rng, 4.0, 0.0);
+        let was = |i: usize| series.covariates[0].values[i.saturating_sub(DELAY)];
+        let values = red(&mut rng, 10.0, 0.2).iter().enumerate().map(|(i, n)| 0.3 * n + 1.2 * was(i)).collect();
+        let Some((Follows::Delayed(0, lag), (slope, sigma), found)) = first(&series, &axis(values)) else { continue };
+        named += 1;
+        let apart_s = (lag - 1_000.0 * DELAY as f64).abs();
+        within += usize::from(apart_s < 2.0 * found.inner_sigma[0].max(30.0) && (slope - 1.2).abs() < 2.0 * sigma);
+    }
+    assert!(named == 10 && within >= 8, "{named} named, {within} within");
+}
+
+/// What is in no catalogue is no effect of temperature, though temperature is among the covariates and not far from it.
+#[test]
+fn a_sensor_that_follows_something_else_has_a_formula_and_no_name() {
+    for form in Form::ALL {
+        let mut right = 0;
+        for seed in 0..20 {
+            let mut rng = ChaCha12Rng::seed_from_u64(seed);
+            let mut series = series(&mut rng);
+            let own = red(&mut rng, 20.0, 0.1);
+            let humidity = series.covariates[0].values.iter().zip(own).map(|(t, own)| 0.5 * (t - 25.0) + own).collect();
+            series.covariates.push(covariate("humidity", "%", humidity));
+            let noise = red(&mut rng, 10.0, 0.3);
+            let follows = |x: &f64| if form == Form::Square { x * x } else { *x };
+            let values = series.covariates[1].values.iter().zip(noise).map(|(x, n)| follows(x) + 0.3 * n).collect();
+            let found = search(&series, &axis(values), &[]);
+            let is = |follows: Follows| matches!(follows, Follows::Form(f, 1, _) if f == form);
+            right += usize::from(found.effects.is_empty() && found.form.is_some_and(|(follows, ..)| is(follows)));
+        }
+        assert!(right >= 18, "{form:?}: {right} of 20");
+    }
 }
 
 /// A sensor beside a reference: what the reference shows is smooth over a few samples and wanders for long.
