@@ -28,7 +28,9 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
     let arcs: Vec<ArcAnswer> = (0..problem.arcs.len()).map(|i| arc_answer(problem, search, &table, i)).collect();
     let unexplained = arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).count();
     let nothing = table.is_empty() && search.manoeuvres.is_empty();
-    let verdict = match (nothing, 2 * unexplained > arcs.len()) {
+    // Where nothing is named, a single arc that holds something is no silence.
+    let odd = if nothing { unexplained > 0 } else { 2 * unexplained > arcs.len() };
+    let verdict = match (nothing, odd) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::Consistent,
         (false, false) => Verdict::Explained,

@@ -10,9 +10,12 @@ use nalgebra::Vector3;
 use super::OrbitError;
 use crate::physics::earth_orientation::{GpsInstant, TAI_MINUS_GPS_S, lagrange_weights, tai_minus_utc_s};
 
-/// A position further than this from the polynomial through its neighbours is a blunder, m: polynomial and
-/// measurement together are good to decimetres at 15 minutes.
-const BLUNDER_M: f64 = 50.0;
+/// A position further than this from the polynomial through its neighbours is a blunder, m, where the polynomial itself is good enough;
+/// else so many times what that misses: 0.9 m for a navigation satellite at 15 minutes.
+const BLUNDER_M: f64 = 1.0;
+const BLUNDER_TIMES: f64 = 10.0;
+/// A polynomial that itself misses more is no judge, m.
+const POLYNOMIAL_M: f64 = 10.0;
 /// GPS time minus BeiDou time, s (exact).
 const GPS_MINUS_BDT_S: f64 = 14.0;
 /// What some makers write where there is no coordinate, km.
@@ -170,28 +173,31 @@ fn track(id: String, found: BTreeMap<i64, Found>, shift_s: f64) -> Track {
 /// Drop isolated positions that the eight neighbours contradict, where the orbit is smooth enough for their polynomial.
 fn drop_blunders(track: &mut Track) {
     let n = track.t_s.len();
-    let miss = |i: usize| -> f64 {
+    // What a position is off its polynomial, and how much of that is a blunder.
+    let miss = |i: usize| -> (f64, f64) {
+        const NONE: (f64, f64) = (0.0, f64::INFINITY);
         if i < 4 || i + 4 >= n {
-            return 0.0;
+            return NONE;
         }
         // What the polynomial itself misses at its middle: (w h)^8 r (4!)^2 / 8!, at the angular rate seen from the ground.
         let radius = track.fixed_m[i].norm();
         let rate = (GM_M3_S2 / radius.powi(3)).sqrt() + EARTH_RATE_RAD_S;
         let spacing = (track.t_s[i + 4] - track.t_s[i - 4]) / 8.0;
-        if (rate * spacing).powi(8) * radius / 70.0 > 0.2 * BLUNDER_M {
-            return 0.0;
+        let polynomial_m = (rate * spacing).powi(8) * radius / 70.0;
+        if polynomial_m > POLYNOMIAL_M {
+            return NONE;
         }
         let around: Vec<usize> = (i - 4..=i + 4).filter(|&j| j != i).collect();
         let nodes: Vec<f64> = around.iter().map(|&j| track.t_s[j] - track.t_s[i]).collect();
         let weights = lagrange_weights(&nodes, 0.0);
         let through: Vector3<f64> = around.iter().zip(&weights).map(|(&j, w)| track.fixed_m[j] * *w).sum();
-        (through - track.fixed_m[i]).norm()
+        ((through - track.fixed_m[i]).norm(), BLUNDER_M.max(BLUNDER_TIMES * polynomial_m))
     };
-    let misses: Vec<f64> = (0..n).map(miss).collect();
+    let (misses, most): (Vec<f64>, Vec<f64>) = (0..n).map(miss).unzip();
     // A blunder spoils its neighbours' polynomials too, by less: only local maxima go.
     let blunder = |i: usize| {
         let around = i.saturating_sub(4)..(i + 5).min(n);
-        misses[i] > BLUNDER_M && around.clone().all(|j| misses[j] <= misses[i])
+        misses[i] > most[i] && around.clone().all(|j| misses[j] <= misses[i])
     };
     let keep: Vec<bool> = (0..n).map(|i| !blunder(i)).collect();
     track.masked += keep.iter().filter(|k| !**k).count();
@@ -225,6 +231,25 @@ mod tests {
         assert_eq!(counts, [("G01", 2, 0), ("G02", 1, 1)]);
         assert_eq!(recording.tracks[1].t_s, [900.0]);
         assert_eq!(recording.origin, GpsInstant { mjd: 55_378.0, s: 0.0 });
+    }
+
+    /// A navigation satellite every quarter of an hour: ten metres off at one epoch is left out, and nothing of the rest.
+    #[test]
+    fn a_blunder_of_ten_metres_is_left_out_alone() {
+        let at = |i: usize, off_m: f64| {
+            let (turn, ground) = (1.4586e-4 * 900.0 * i as f64, 7.2921e-5 * 900.0 * i as f64);
+            let (x, y, z) = (turn.cos(), turn.sin() * 0.574, turn.sin() * 0.819);
+            let (x, y) = (x * ground.cos() + y * ground.sin(), y * ground.cos() - x * ground.sin());
+            Vector3::new(x, y, z) * 26_560e3 + Vector3::new(off_m, 0.0, 0.0)
+        };
+        for off_m in [0.0, 10.0, -30.0] {
+            let fixed_m = (0..96).map(|i| at(i, if i == 40 { off_m } else { 0.0 })).collect();
+            let t_s = (0..96).map(|i| 900.0 * f64::from(i)).collect();
+            let mut track = Track { id: "G01".into(), t_s, fixed_m, ..Track::default() };
+            drop_blunders(&mut track);
+            assert_eq!(track.masked, usize::from(off_m != 0.0), "{off_m}");
+            assert_eq!(track.t_s.contains(&36_000.0), off_m == 0.0, "{off_m}");
+        }
     }
 
     #[test]
