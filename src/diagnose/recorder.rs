@@ -12,7 +12,7 @@ use super::error::CaseError;
 use super::noise::dot;
 use crate::ingest::wire::{PlaybackPart, PlaybackReader};
 use crate::math::rms::about_mean;
-use crate::pipeline::calibration::{Anomaly, Bias, Calibration, bias_law::PARAMETERS, saturation};
+use crate::pipeline::calibration::{Anomaly, Bias, Calibration, Provenance, bias_law::PARAMETERS, saturation};
 use crate::pipeline::station::{Station, replay};
 use crate::pipeline::window::Window;
 use crate::pipeline::{PlaybackId, Product, Settings};
@@ -37,12 +37,25 @@ pub struct Usable {
 /// leaves open there is a nuisance of the fit as everywhere: four hours at either end of a day are not given away.
 const FORGIVEN: Quality = Quality::RANGE_CORRECTED.with_if(Quality::EXTRAPOLATED, true);
 
+/// Whether the scale factor of every axis is measured in the range it is in, or known without error: one that is configured for the
+/// instrument at large, as before the first scale calibration, may be off by several percent, and that would be found.
+fn is_scaled(calibration: &Calibration, ranges: [Option<Range>; 3]) -> bool {
+    let is_measured = |(axis, range): (usize, Option<Range>)| {
+        let scale = range.map(|range| &calibration.scale[axis][range.index()]);
+        scale.is_some_and(|scale| {
+            matches!(scale.provenance, Provenance::Measured | Provenance::CarriedOver) || scale.sigma == 0.0
+        })
+    };
+    ranges.into_iter().enumerate().all(is_measured)
+}
+
 /// The windows of a station that a diagnosis may use.
 pub fn usable(station: &Station) -> Usable {
     let mut found = Usable { calibration: station.calibration().map_or(0, |c| c.version), ..Usable::default() };
     let mut conditions = Vec::new();
     for (window, product) in station.windows().zip(station.products()) {
         if product.quality.is_good_but_for(FORGIVEN)
+            && station.calibration().is_some_and(|calibration| is_scaled(calibration, product.range))
             && product.mode == Mode::Normal
             && push(&mut found.recording, station, window, product)
         {
