@@ -205,3 +205,33 @@ fn push(recording: &mut Recording, station: &Station, window: &Window, product: 
     }
     true
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::Settings;
+    use crate::pipeline::calibration::{KnownCalibration, Scale};
+
+    #[test]
+    fn an_axis_whose_scale_factor_is_not_measured_is_not_calibrated() {
+        let (scale, law) = ([[1.1; 3]; 3], [[[0.0, 0.0, 0.0, 0.0, 10.0, 100.0]; 3]; 3]);
+        let known = serde_json::json!({ "scale_correction": scale, "bias_law_coefficients": law });
+        let mut calibration = KnownCalibration::parse(&known.to_string()).unwrap().calibration(&Settings::sts65());
+        let ranges = [Some(Range::C), Some(Range::B), Some(Range::C)];
+        assert!(is_scaled(&calibration, ranges), "known without error");
+        let scale = |provenance| Scale { correction: 1.1, sigma: 0.01, provenance };
+        for (provenance, usable) in [
+            (Provenance::Configured, false),
+            (Provenance::FromRangeB, false),
+            (Provenance::CarriedOver, true),
+            (Provenance::Measured, true),
+        ] {
+            calibration.scale[2][Range::C.index()] = scale(provenance);
+            assert_eq!(is_scaled(&calibration, ranges), usable, "{provenance:?}");
+        }
+        // What no axis is in does not matter.
+        calibration.scale[1][Range::C.index()] = scale(Provenance::Configured);
+        assert!(is_scaled(&calibration, ranges));
+        assert!(!is_scaled(&calibration, [None, Some(Range::B), Some(Range::C)]), "an axis without a range");
+    }
+}
