@@ -2,6 +2,9 @@
 
 use serde::Serialize;
 
+/// The least false-alarm probability that is told: nothing is known to hold farther out.
+pub const LEAST_PROBABILITY: f64 = 1e-12;
+
 /// The answer to one case. `NaN` never appears: what is not known is absent or null.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {

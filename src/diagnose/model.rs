@@ -129,21 +129,16 @@ struct Onset {
 
 /// Of every member, where its onset is fitted.
 fn onsets(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) -> Vec<Option<Onset>> {
-    let is_fitted = |i: usize| match entries[set.members[i].entry].family {
-        Family::Listed(effect) => effect.nonlinear.first().is_some_and(|p| p.name == "onset_s" && p.step > 0.0),
-        Family::Open(_) => false,
+    let is_fitted = |effect: &Effect| effect.nonlinear.first().is_some_and(|p| p.name == "onset_s" && p.step > 0.0);
+    let one = |i: usize| match entries[set.members[i].entry].family {
+        Family::Listed(effect) if is_fitted(effect) => Some(onset(scene, frame, entries, set, (i, effect))),
+        _ => None,
     };
-    let one = |i: usize| is_fitted(i).then(|| onset(scene, frame, entries, set, i));
     (0..set.members.len()).map(one).collect()
 }
 
 /// The onset of member `i`, from its posterior: one window more or less can decide, so that the curvature at the peak says too little.
-fn onset(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: usize) -> Onset {
-    let (fitted, _) = set.coefficients(frame, entries);
-    let still = vec![0.0; fitted.len()];
-    let Family::Listed(effect) = entries[set.members[i].entry].family else {
-        return Onset { sigma_s: 0.0, moves: still };
-    };
+fn onset(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, (i, effect): (usize, &Effect)) -> Onset {
     let others = set.without(i);
     let chosen = others.chosen(frame);
     let sizes = set.members[i].sizes(entries);
@@ -187,7 +182,8 @@ fn onset(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, i: usize) -
         half_width_s *= 3.0 / f64::from(ONSET_SCAN_STEPS);
         sigma = scan(half_width_s).0;
     }
-    Onset { sigma_s: sigma, moves: still }
+    let coefficients = set.members.iter().map(|m| m.linear()).sum();
+    Onset { sigma_s: sigma, moves: vec![0.0; coefficients] }
 }
 
 /// Mean squares by which the coefficients of a set move with the onset of member `i`; `likely` are its shifts and their weights.

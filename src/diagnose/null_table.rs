@@ -10,6 +10,8 @@
 //! the very last stand for one or two records. Beyond they fall as exp(-T), the bound of Ville for evidence ratios. Where the
 //! probability itself matters, ask for the bootstrap.
 
+use super::answer::LEAST_PROBABILITY;
+
 /// Log likelihood of slow noise, when nothing is left out, below which a record is quiet: half of the nulls are.
 const QUIET: f64 = 2.5;
 
@@ -53,9 +55,6 @@ const OF_SLOW: [(f64, f64); 16] = [
     (2.54, 0.0009),
 ];
 
-/// The least probability that is told: no table and no bound is known to hold farther out.
-pub const LEAST: f64 = 1e-12;
-
 /// Whether a record is quiet, from the log likelihood of slow noise in it above that of hardly any when nothing is left out. An effect
 /// that slow noise could take makes a record look slow; then it is weighed as such.
 pub fn is_quiet(slow_evidence: f64) -> bool {
@@ -76,7 +75,7 @@ pub fn false_alarm_probability(statistic: f64, slow_evidence: f64) -> f64 {
         }
     }
     let (last, p) = table[table.len() - 1];
-    (p * (-(statistic - last)).exp()).max(LEAST)
+    (p * (-(statistic - last)).exp()).max(LEAST_PROBABILITY)
 }
 
 #[cfg(test)]

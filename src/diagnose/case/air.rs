@@ -12,8 +12,8 @@ use crate::physics::geodetic::place;
 
 /// Rows that are asked.
 const ROWS: usize = 48;
-/// Heights at which the density of quiet and of stormy days lies within a factor of thirty of that of [`MIDDLE`], m.
-const HEIGHT_M: [f64; 2] = [120e3, 550e3];
+/// Heights at which the density of quiet and of stormy days lies within a factor of thirty of that of [`MIDDLE`], m: see the test.
+const HEIGHT_M: [f64; 2] = [120e3, 500e3];
 /// By how much the density may differ from the model's, to the next power of ten.
 const FACTOR: f64 = 100.0;
 /// Neither quiet nor stormy.
@@ -43,4 +43,28 @@ pub fn agrees(file: &str, header: &Header, ancillary: &Ancillary) -> Result<(), 
     }
     let column = "density_kg_m3 (at this height)".into();
     Err(CaseError::Unit { file: file.into(), column, found, unit: "kg/m3", low, high })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The quietest and the stormiest days of a century, by day and by night.
+    #[test]
+    fn the_density_of_any_day_is_within_a_factor_of_thirty() {
+        let atmosphere = Atmosphere::default();
+        let quiet = Activity { f107: 65.0, f107_average: 66.0, ap: 0.0 };
+        let stormy = Activity { f107: 300.0, f107_average: 250.0, ap: 300.0 };
+        for height_m in [HEIGHT_M[0], 200e3, 300e3, 400e3, HEIGHT_M[1]] {
+            for unix_s in (0..8).map(|hour| 773_000_000.0 + 10_800.0 * f64::from(hour)) {
+                let r_m = Vec3::new(6_378_137.0 + height_m, 0.0, 0.0);
+                let density = |activity| atmosphere.density_kg_m3(unix_s, &r_m, activity).unwrap();
+                let middle = density(&MIDDLE);
+                for other in [density(&quiet), density(&stormy)] {
+                    let factor = (other / middle).max(middle / other);
+                    assert!(factor < 30.0, "{height_m} m: {factor}");
+                }
+            }
+        }
+    }
 }

@@ -7,7 +7,7 @@ use super::forces::Term;
 use super::held_out::missed_m;
 use super::manoeuvre::Manoeuvre;
 use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m};
-use crate::diagnose::answer::{Alternative, Interval, Located, ParameterAnswer, Verdict};
+use crate::diagnose::answer::{Alternative, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, StepAnswer, in_order, parameter, posterior,
 };
@@ -42,7 +42,7 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
     let scores = table.iter().map(|(_, score, _)| *score).chain(search.manoeuvres.iter().map(|one| one.score));
     let weakest = scores.fold(f64::INFINITY, f64::min);
     let false_alarm_probability = match verdict {
-        Verdict::Explained => (-0.5 * weakest).exp().clamp(1e-12, 1.0),
+        Verdict::Explained => (-0.5 * weakest).exp().clamp(LEAST_PROBABILITY, 1.0),
         Verdict::Unexplained => (-0.5 * SCORE_MIN).exp(),
         _ => (-0.5 * strongest_refused).exp().clamp(0.0, 1.0),
     };

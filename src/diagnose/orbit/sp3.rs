@@ -10,9 +10,10 @@ use nalgebra::Vector3;
 use super::OrbitError;
 use crate::physics::earth_orientation::{GpsInstant, TAI_MINUS_GPS_S, lagrange_weights, tai_minus_utc_s};
 
-/// A position further than this from the polynomial through its neighbours is a blunder, m, where the polynomial itself is good enough;
-/// else so many times what that misses: 0.9 m for a navigation satellite at 15 minutes.
+/// A position further than this from the polynomial through its neighbours is a blunder, m, where the polynomial itself is good enough.
 const BLUNDER_M: f64 = 1.0;
+/// Else it is so many times what the polynomial misses, 0.9 m for a navigation satellite at 15 minutes: an eccentric orbit turns faster
+/// near the Earth than the circle through the place, by which that is reckoned.
 const BLUNDER_TIMES: f64 = 10.0;
 /// A polynomial that itself misses more is no judge, m.
 const POLYNOMIAL_M: f64 = 10.0;

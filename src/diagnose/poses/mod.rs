@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector, Dyn, Owned, Vector3};
 
 use self::still::{Pose, find_poses};
-use crate::diagnose::answer::{Located, ParameterAnswer, Verdict};
+use crate::diagnose::answer::{LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::keys::texts;
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, in_order, parameter, posterior,
@@ -449,7 +449,9 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
         schema: "oare.diagnosis/1".to_owned(),
         case: case.id.clone(),
         verdict,
-        false_alarm_probability: (-0.5 * found.added.last().map_or(found.refused, |a| a.1)).exp().clamp(1e-12, 1.0),
+        false_alarm_probability: (-0.5 * found.added.last().map_or(found.refused, |a| a.1))
+            .exp()
+            .clamp(LEAST_PROBABILITY, 1.0),
         located: Located::default(),
         effects,
         alternatives: Vec::new(),

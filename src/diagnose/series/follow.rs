@@ -74,6 +74,15 @@ impl Follows {
         }
     }
 
+    /// The response to the same at once, of one that is late.
+    pub fn immediate(&self) -> Option<Self> {
+        match *self {
+            Self::Temperature(k, s) | Self::Delayed(k, s) if s > 0.0 => Some(Self::Temperature(k, 0.0)),
+            Self::Form(form, k, s) if s > 0.0 => Some(Self::Form(form, k, 0.0)),
+            _ => None,
+        }
+    }
+
     /// The same effect with another such number.
     pub fn with_inner(self, s: f64) -> Self {
         match self {
@@ -97,9 +106,14 @@ impl Form {
         values.iter().map(|x| if self == Self::Square { (x - mean).powi(2) } else { x - mean }).collect()
     }
 
+    /// Its power, as it is written behind what is raised to it.
+    pub fn power(self) -> &'static str {
+        if self == Self::Square { "^2" } else { "" }
+    }
+
     /// As a formula of a covariate.
     pub fn words(self, covariate: &str, lag_s: f64) -> String {
-        let power = if self == Self::Square { "^2" } else { "" };
+        let power = self.power();
         let late = if lag_s > 0.0 { format!(", {lag_s:.0} s late") } else { String::new() };
         format!("({covariate} - <{covariate}>){power}{late}")
     }

@@ -1,10 +1,10 @@
 //! What a series was found to follow, in words and figures: one entry an axis, and all axes together. Not here: how it was
 //! found (`search`).
 
-use super::follow::{Follows, Form};
+use super::follow::Follows;
 use super::read::{Axis, Series};
 use super::search::{AxisFound, held_out, missed, regress};
-use crate::diagnose::answer::{Covariate, Hypothesis, Interval, Located, ParameterAnswer, Verdict};
+use crate::diagnose::answer::{Covariate, Hypothesis, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level, Limit, in_order, parameter, posterior,
 };
@@ -37,7 +37,7 @@ pub fn answer(case: &MeasuredCase, series: &Series, found: &[AxisFound]) -> Answ
         schema: "oare.diagnosis/1".to_owned(),
         case: case.id.clone(),
         verdict,
-        false_alarm_probability: (-0.5 * score).exp().clamp(1e-12, 1.0),
+        false_alarm_probability: (-0.5 * score).exp().clamp(LEAST_PROBABILITY, 1.0),
         located: located(&measured),
         alternatives: Vec::new(),
         hypothesis: measured
@@ -153,8 +153,7 @@ impl Row<'_> {
         let (Follows::Form(form, k, lag_s), _, fit) = self.found.form.as_ref()? else { return None };
         let covariate = &self.series.covariates[*k];
         let (value, sigma) = *fit.coefficients.last()?;
-        let power = if *form == Form::Square { "^2" } else { "" };
-        let per = format!("{}/{}{power}", self.axis.unit, covariate.unit);
+        let per = format!("{}/{}{}", self.axis.unit, covariate.unit, form.power());
         Some(Hypothesis {
             formula: format!("({value:.3e} +- {sigma:.1e}) {per} x {}", form.words(&covariate.name, *lag_s)),
             axis: self.axis.name.clone(),

@@ -4,7 +4,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::follow::{Equation, Follows, Form, equation};
-use super::read::{Axis, Series};
+use super::read::{Axis, CovariateSeries, Series};
 use super::red::{self, Beat};
 use crate::diagnose::measured::{MeasuredCase, MeasuredError};
 use crate::math::rms::rms;
@@ -19,7 +19,7 @@ const LAGS: [f64; 8] = [0.0015, 0.003, 0.006, 0.0125, 0.025, 0.05, 0.1, 0.2];
 const DRIFTS: [f64; 4] = [0.05, 0.15, 0.5, 5.0];
 /// The likeliest instants of a step that are weighed in full.
 const STEPS: usize = 3;
-/// The longest delay tried, as a part of the record.
+/// The longest delay tried, as a part of the record: of what is later still too little is left to be predicted.
 const DELAY_MAX: f64 = 0.1;
 /// Offsets tried against a reference, in samples, either way.
 const OFFSETS: [f64; 11] = [0.0, 1.0, 2.0, 4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0];
@@ -166,30 +166,17 @@ fn best_form(
     listed: f64,
     beat: &Beat,
 ) -> Option<(Follows, f64, Regression)> {
-    let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
-    let (now, before) = (likelihood(series, axis, included, beat), held_out(series, axis, included));
-    let charge = (axis.values.len() as f64).ln();
-    let with = |form: Follows| [included, &[form]].concat();
-    let score = |form: Follows| likelihood(series, axis, &with(form), beat) - now - form.price() * charge;
-    let mut scored: Vec<(Follows, f64)> = Vec::new();
-    for (k, covariate) in series.covariates.iter().enumerate() {
-        for form in Form::ALL.into_iter().filter(|form| *form == Form::Square || !covariate.is_temperature()) {
-            let lags = [0.0].into_iter().chain(LAGS.map(|part| part * span_s));
-            let forms: Vec<(Follows, f64)> =
-                lags.map(|lag_s| Follows::Form(form, k, lag_s)).map(|form| (form, score(form))).collect();
-            let immediate = forms[0].1;
-            let earned =
-                |(i, (_, score)): &(usize, &(Follows, f64))| *i == 0 || *score > immediate.max(0.0) + LATE_MARGIN;
-            scored.extend(forms.iter().enumerate().filter(earned).map(|(_, scored)| *scored));
-        }
+    let (form, score) = best_of(series, axis, included, forms(series), beat).best?;
+    if score < listed + FORM_MARGIN {
+        return None;
     }
-    scored.retain(|(_, score)| *score >= SCORE_MIN.max(listed + FORM_MARGIN));
-    scored.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let (form, score) = scored.into_iter().find(|(form, _)| held_out(series, axis, &with(*form)) < before)?;
-    let mut model = with(form);
-    refined(series, axis, &mut model, included.len(), beat);
-    let fit = regress(series, axis, &model);
-    Some((model[included.len()], score, fit))
+    let mut model = [included, &[form]].concat();
+    let last = included.len();
+    refined(series, axis, &mut model, last, beat);
+    let mut fit = regress(series, axis, &model);
+    let sigma = inner_sigma(series, axis, &model, last, beat);
+    widen(series, axis, &model, last, &[sigma], &mut fit.coefficients);
+    Some((model[last], score, fit))
 }
 
 struct Step {
@@ -199,37 +186,43 @@ struct Step {
 
 fn step(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Step {
     let taken = |id: &str| model.iter().any(|f| f.id() == id);
-    let now = likelihood(series, axis, model, beat);
-    let charge = (axis.values.len() as f64).ln();
-    let mut scored: Vec<(Follows, f64)> = Vec::new();
     let steps = if taken("bias_step") { Vec::new() } else { likely_steps(series, axis, model, beat) };
     let delays = if taken("temperature_bias") { Vec::new() } else { likely_delays(series, axis, model, beat) };
-    for candidate in candidates(series, axis).into_iter().chain(steps).chain(delays).filter(|c| !taken(c.id())) {
-        let mut with = model.to_vec();
-        with.push(candidate);
-        let score = likelihood(series, axis, &with, beat) - now - candidate.price() * charge;
-        scored.push((candidate, score));
-    }
+    let all = candidates(series, axis).into_iter().chain(steps).chain(delays).filter(|c| !taken(c.id()));
+    best_of(series, axis, model, all.collect(), beat)
+}
+
+/// The candidate with most evidence of those that have enough of it, earn what they were looked for and predict.
+fn best_of(series: &Series, axis: &Axis, model: &[Follows], candidates: Vec<Follows>, beat: &Beat) -> Step {
+    let with = |candidate: Follows| [model, &[candidate]].concat();
+    let now = likelihood(series, axis, model, beat);
+    let charge = (axis.values.len() as f64).ln();
+    let score = |c: Follows| likelihood(series, axis, &with(c), beat) - now - c.price() * charge;
+    let mut scored: Vec<(Follows, f64)> = candidates.into_iter().map(|c| (c, score(c))).collect();
     let strongest = scored.iter().map(|(_, score)| *score).fold(0.0, f64::max);
     scored.retain(|(_, score)| *score >= SCORE_MIN);
     // A late response has one unknown more than the immediate one to the same covariate, and must earn it.
-    let immediate: Vec<(Follows, f64)> =
-        scored.iter().filter(|(f, _)| matches!(f, Follows::Temperature(_, 0.0))).copied().collect();
-    let earned = |(follows, score): &(Follows, f64)| match follows {
-        Follows::Temperature(k, lag) | Follows::Delayed(k, lag) if *lag > 0.0 => {
-            immediate.iter().all(|(f, s)| *f != Follows::Temperature(*k, 0.0) || *score > s + LATE_MARGIN)
-        }
-        _ => true,
-    };
-    scored.retain(earned);
+    let all = scored.clone();
+    scored.retain(|(follows, score)| {
+        let immediate = follows.immediate();
+        all.iter().all(|(other, s)| Some(*other) != immediate || *score > s + LATE_MARGIN)
+    });
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
     let before = held_out(series, axis, model);
-    let predicts = |(candidate, _): &(Follows, f64)| {
-        let mut with = model.to_vec();
-        with.push(*candidate);
-        held_out(series, axis, &with) < before
+    let best = scored.into_iter().find(|(candidate, _)| held_out(series, axis, &with(*candidate)) < before);
+    Step { best, strongest }
+}
+
+/// Every form of every covariate that is no effect of the catalogue, at once and late.
+fn forms(series: &Series) -> Vec<Follows> {
+    let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
+    let lags_s: Vec<f64> = [0.0].into_iter().chain(LAGS.map(|part| part * span_s)).collect();
+    let of_one = |(k, covariate): (usize, &CovariateSeries)| {
+        let listed = |form: &Form| *form == Form::Linear && covariate.is_temperature();
+        let forms = Form::ALL.into_iter().filter(|form| !listed(form));
+        forms.flat_map(|form| lags_s.iter().map(move |lag_s| Follows::Form(form, k, *lag_s))).collect::<Vec<Follows>>()
     };
-    Step { best: scored.into_iter().find(predicts), strongest }
+    series.covariates.iter().enumerate().flat_map(of_one).collect()
 }
 
 fn candidates(series: &Series, axis: &Axis) -> Vec<Follows> {

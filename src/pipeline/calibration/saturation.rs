@@ -16,6 +16,8 @@ use crate::units::Clock;
 const SAMPLES_MIN: usize = 10;
 /// Autoranging reacts within this, tenths of a second.
 const AUTORANGE_TENTHS: i64 = 50;
+/// Length of a record, whose range is that of all its samples, tenths of a second.
+const RECORD_TENTHS: i64 = 10;
 /// A step to the rail larger than this between two samples is not the filter's output of an ordinary overload, counts.
 const STEP_COUNTS: i32 = 16_384;
 /// Runs closer than this are one, tenths of a second.
@@ -63,11 +65,11 @@ pub(super) fn told(runs: &[Run], corrections: &[RangeCorrection]) -> Vec<Anomaly
 
 /// Whether the instrument answered an axis at its rail as it is meant to, by a coarser range within the time that takes.
 pub fn is_answered(archive: &Archive, anomaly: &Anomaly) -> bool {
-    let soon = |clock: Clock| clock.plus_tenths(AUTORANGE_TENTHS + 10);
+    let soon = |clock: Clock| clock.plus_tenths(AUTORANGE_TENTHS + RECORD_TENTHS);
     if anomaly.kind != AnomalyKind::Saturation || anomaly.to > soon(anomaly.from) {
         return false;
     }
-    let after = || archive.records_between(anomaly.from.plus_tenths(-10), soon(anomaly.to));
+    let after = || archive.records_between(anomaly.from.plus_tenths(-RECORD_TENTHS), soon(anomaly.to));
     anomaly.axes.iter().all(|axis| {
         let mut ranges = after().map(|record| record.ranges[axis.index()]);
         // A is the coarsest and the least.
