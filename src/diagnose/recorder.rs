@@ -7,12 +7,14 @@
 
 use nalgebra::DMatrix;
 
-use super::case::{Case, Fault, Header, Recording, Texts};
+use super::case::{Case, Fault, FittedLaw, Header, Recording, Texts};
 use super::error::CaseError;
 use super::noise::dot;
 use crate::ingest::wire::{PlaybackPart, PlaybackReader};
 use crate::math::rms::about_mean;
-use crate::pipeline::calibration::{Anomaly, Bias, Calibration, Provenance, bias_law::PARAMETERS, saturation};
+use crate::pipeline::calibration::{
+    Anomaly, Bias, BiasMeasurement, Calibration, Provenance, bias_law::PARAMETERS, saturation,
+};
 use crate::pipeline::station::{Station, replay};
 use crate::pipeline::window::Window;
 use crate::pipeline::{PlaybackId, Product, Settings};
@@ -72,7 +74,9 @@ pub fn usable(station: &Station) -> Usable {
     };
     found.recording.faults = station.derived().anomalies.iter().map(fault).collect();
     if let Some(calibration) = station.calibration() {
+        let measurements = &station.derived().measurements;
         found.recording.bias_errors_ng = OARE_AXIS.map(|axis| bias_errors(calibration, axis, &conditions));
+        found.recording.bias_laws = OARE_AXIS.map(|axis| bias_laws(calibration, axis, measurements, &conditions));
     }
     found
 }
@@ -96,6 +100,40 @@ fn bias_errors(calibration: &Calibration, axis: usize, windows: &[Conditions]) -
         errors.extend((0..PARAMETERS).map(|j| windows.iter().map(|w| w[j]).collect::<Vec<f64>>()));
     }
     principal(&errors)
+}
+
+/// The bias laws of an OARE axis at the windows, each with the measurements it was fitted to. From count to count and from nanog to
+/// nanog are the same shares: a law and its measurements are of one range.
+fn bias_laws(
+    calibration: &Calibration,
+    axis: usize,
+    measurements: &[BiasMeasurement],
+    windows: &[Conditions],
+) -> Vec<FittedLaw> {
+    let law = |range: Range| {
+        let fit = calibration.bias[axis][range.index()].as_ref().and_then(Bias::fit)?;
+        if !windows.iter().any(|(_, _, ranges)| ranges[axis] == Some(range)) {
+            return None;
+        }
+        let of_law = measurements.iter().filter(|m| m.axis.index() == axis && m.range == range);
+        let gradients: Vec<[f64; PARAMETERS]> = windows
+            .iter()
+            .map(|(clock_s, temperature_c, ranges)| match ranges[axis] == Some(range) {
+                true => fit.gradient_at(calibration.time.met_h(*clock_s), *temperature_c),
+                false => [0.0; PARAMETERS],
+            })
+            .collect();
+        Some(FittedLaw {
+            measured_s: of_law.map(|m| m.clock_s).collect(),
+            answers: by_figure(&fit.answers),
+            gradients: by_figure(&gradients),
+        })
+    };
+    Range::ALL.into_iter().filter_map(law).collect()
+}
+
+fn by_figure(rows: &[[f64; PARAMETERS]]) -> Vec<Vec<f64>> {
+    (0..PARAMETERS).map(|j| rows.iter().map(|row| row[j]).collect()).collect()
 }
 
 /// The same errors by fewer series: sums of them that vary independently, without those that hardly vary. What is the same in all

@@ -67,6 +67,15 @@ pub enum Fault {
         /// Counts added in range C, both positions.
         counts: [f64; 3],
     },
+    /// The bias of an axis steps, in every range alike, and stays there: the table does not turn it, so that calibrations see it.
+    BiasStep {
+        /// Axis 0, 1, 2.
+        axis: usize,
+        /// When.
+        at_clock_s: u32,
+        /// By how much, ng.
+        ng: f64,
+    },
 }
 
 /// Seconds in reentry mode with Y at the rail before the shutdown.

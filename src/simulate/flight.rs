@@ -287,6 +287,15 @@ impl<'a> Flight<'a> {
         extra
     }
 
+    /// What steps of the bias of an axis have come to by this second, ng.
+    fn stepped_ng(&self, axis: usize) -> f64 {
+        let step = |fault: &Fault| match fault {
+            Fault::BiasStep { axis: at, at_clock_s, ng } if *at % 3 == axis && *at_clock_s <= self.clock_s => *ng,
+            _ => 0.0,
+        };
+        self.config.faults.iter().map(step).sum()
+    }
+
     /// The Orbiter's clock at this second, as the record states it, ms since 1970.
     fn orbiter_unix_ms(&mut self) -> i64 {
         let config = self.config;
@@ -351,7 +360,9 @@ impl Iterator for Flight<'_> {
         let ranges = self.ranges(segment, &mut changes);
         let bias = std::array::from_fn(|axis| {
             std::array::from_fn(|range| {
-                config.instrument.bias_counts(Axis::ALL[axis], Range::ALL[range], met_h, temperature_c)
+                let (name, range) = (Axis::ALL[axis], Range::ALL[range]);
+                let law = config.instrument.bias_counts(name, range, met_h, temperature_c);
+                law + self.stepped_ng(axis) / config.instrument.ng_per_count(name, range)
             })
         });
         let now = Now { clock_s, segment, ranges, bias, asleep: config.noise.asleep(met_h) };

@@ -179,6 +179,7 @@ enum RawFault {
     Saturation { axis: RawAxis, from_clock_s: f64, seconds: f64 },
     Shutdown { at_clock_s: u32 },
     BiasOutlier { calibration_id: u16, counts: [f64; 3] },
+    BiasStep { axis: RawAxis, at_clock_s: u32, ng: f64 },
 }
 
 #[derive(Debug, Clone, Copy, Deserialize)]
@@ -368,6 +369,7 @@ impl RawFault {
             }
             Self::Shutdown { at_clock_s } => Fault::Shutdown { at_clock_s },
             Self::BiasOutlier { calibration_id, counts } => Fault::BiasOutlier { calibration_id, counts },
+            Self::BiasStep { axis, at_clock_s, ng } => Fault::BiasStep { axis: axis as usize, at_clock_s, ng },
         }
     }
 }

@@ -42,11 +42,9 @@ fn sets_that_a_dump_cannot_tell_apart_have_an_observation_that_would() {
     assert!(observation.gain.is_some_and(|gain| gain > 0.0), "{observation:?}");
 }
 
-/// The diagnosis of a flight of twelve hours with a fault.
-fn with_fault(fault: Fault) -> Diagnosis {
-    let mut config = MissionConfig::sts65(5, 12.0);
-    config.faults.push(fault);
-    let mission = Mission::new(config).unwrap();
+/// The files of a flight of so many hours with faults.
+fn files(hours: f64, faults: Vec<Fault>) -> Vec<(String, Vec<u8>)> {
+    let mission = Mission::new(MissionConfig { faults, ..MissionConfig::sts65(5, hours) }).unwrap();
     let link = LinkConfig::default();
     let passes = playbacks(&frames(mission.fly(), link), &link, &RecorderConfig::clean(), 5);
     let mut files: Vec<(String, Vec<u8>)> = case_files(&mission, "with-fault", "recording.dump")
@@ -55,7 +53,12 @@ fn with_fault(fault: Fault) -> Diagnosis {
         .map(|(name, text)| (name.to_string(), text.into_bytes()))
         .collect();
     files.push(("recording.dump".into(), passes.into_iter().flat_map(|pass| pass.octets).collect()));
-    diagnose(&super::case(&files), &Settings::default()).unwrap()
+    files
+}
+
+/// The diagnosis of a flight of twelve hours with a fault.
+fn with_fault(fault: Fault) -> Diagnosis {
+    diagnose(&super::case(&files(12.0, vec![fault])), &Settings::default()).unwrap()
 }
 
 /// A bump drives an axis to its rail, and the instrument takes a coarser range: it is told, and no effect. At the rail in every range for
@@ -83,4 +86,32 @@ fn records_that_name_a_wrong_range_are_an_effect_with_their_span() {
     assert!(found.notes.contains(&effect.why), "{:?}", found.notes);
     let json = serde_json::to_string(&found).unwrap();
     assert!(!json.contains("\"confirmed\":null"), "what is not known is absent");
+}
+
+/// A bias that steps is seen by the calibrations behind it, and the law takes what it can of it: what is left in the windows, by two flights of
+/// one seed, is what the fitted law says. At every calibration it sees the step whole.
+#[test]
+fn of_a_step_of_the_bias_the_windows_keep_what_the_law_does_not_take() {
+    const STEP: [(usize, f64); 2] = [(0, 120.0), (2, -90.0)];
+    const AT_S: u32 = 60_000;
+    let steps = STEP.map(|(axis, ng)| Fault::BiasStep { axis, at_clock_s: AT_S, ng });
+    let [without, with] = [Vec::new(), steps.to_vec()].map(|faults| super::case(&files(30.0, faults)).recording);
+    assert_eq!(without.clock_s, with.clock_s);
+    for (body, size_ng) in [(0, 120.0), (1, -90.0), (2, 0.0)] {
+        let step = |clock_s: &[f64]| -> Vec<f64> {
+            clock_s.iter().map(|t| if *t > f64::from(AT_S) { size_ng } else { 0.0 }).collect()
+        };
+        let mut expected = step(&without.clock_s);
+        let whole = expected.clone();
+        for law in &without.bias_laws[body] {
+            law.take_from(&mut expected, &step(&law.measured_s));
+        }
+        let found: Vec<f64> = with.a_ng[body].iter().zip(&without.a_ng[body]).map(|(a, b)| a - b).collect();
+        let rms = |of: &dyn Fn(usize) -> f64| {
+            ((0..found.len()).map(|i| of(i).powi(2)).sum::<f64>() / found.len() as f64).sqrt()
+        };
+        let away = rms(&|i| found[i] - expected[i]);
+        eprintln!("axis {body}: {away:.2} ng rms from the law, {:.2} from the step", rms(&|i| found[i] - whole[i]));
+        assert!(away < 0.1 * rms(&|i| found[i] - whole[i]).max(10.0), "axis {body}: {away}");
+    }
 }

@@ -2,6 +2,7 @@
 
 mod air;
 mod check;
+mod fitted_law;
 mod header;
 mod motion;
 mod read;
@@ -11,6 +12,7 @@ use std::collections::BTreeMap;
 use std::ops::Deref;
 use std::sync::Arc;
 
+pub use fitted_law::FittedLaw;
 pub use header::{Files, Header, Vehicle};
 pub use spikes::SPIKE;
 
@@ -53,6 +55,8 @@ pub struct Recording {
     pub dev_ng: [Vec<f64>; 3],
     /// What the calibration leaves open, per axis: series whose true sizes are independent and standard normal, ng.
     pub bias_errors_ng: [Vec<Vec<f64>>; 3],
+    /// The bias laws that were fitted to the dump itself, per axis: what they take from a bias of the sensor.
+    pub bias_laws: [Vec<FittedLaw>; 3],
     /// What was wrong with the instrument, as far as its own dump tells.
     pub faults: Vec<Fault>,
 }
@@ -335,6 +339,7 @@ fn take(recording: &Recording, keep: &[usize]) -> Recording {
         a_ng: std::array::from_fn(|k| pick(&recording.a_ng[k])),
         dev_ng: std::array::from_fn(|k| pick(&recording.dev_ng[k])),
         bias_errors_ng: recording.bias_errors_ng.each_ref().map(|axis| axis.iter().map(pick).collect()),
+        bias_laws: recording.bias_laws.each_ref().map(|axis| axis.iter().map(|law| law.at(keep)).collect()),
         faults: recording.faults.clone(),
     }
 }

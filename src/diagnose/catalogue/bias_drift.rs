@@ -1,6 +1,6 @@
 //! The bias decays exponentially; amplitudes refer to the first instant of the simulation.
 
-use super::{Effect, Nonlinear, SELDOM_LARGE, Shape, Theta, push};
+use super::{Effect, Nonlinear, SELDOM_LARGE, Shape, Theta, in_sensor, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -38,7 +38,8 @@ fn log_density(_: &Scene, _: &Theta) -> f64 {
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let inside = theta[0] > TAU_RANGE_S[0].ln() && theta[0] < TAU_RANGE_S[1].ln();
-    inside.then(|| Shape::scalar(decay(scene.clock_s(), scene.case.simulation.clock_s[0], theta[0].exp())))
+    let begins_s = scene.case.simulation.clock_s[0];
+    inside.then(|| in_sensor(scene, |clock_s| decay(clock_s, begins_s, theta[0].exp())))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The bias steps at an instant and stays.
 
-use super::{Effect, ONSET, SELDOM_LARGE, Shape, Theta, onsets, push};
+use super::{Effect, ONSET, SELDOM_LARGE, Shape, Theta, in_sensor, onsets, push};
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -35,7 +35,7 @@ fn log_density(scene: &Scene, _: &Theta) -> f64 {
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let [start, end] = scene.span_s();
     (theta[0] > start + 300.0 && theta[0] < end - 300.0)
-        .then(|| Shape::scalar(decay(scene.clock_s(), theta[0], f64::INFINITY)))
+        .then(|| in_sensor(scene, |clock_s| decay(clock_s, theta[0], f64::INFINITY)))
 }
 
 #[cfg(test)]

@@ -348,6 +348,22 @@ pub fn onsets(scene: &Scene, spacing_s: f64, margin_s: f64) -> Vec<f64> {
     (0..=n).map(|i| start + margin_s + i as f64 * spacing_s).collect()
 }
 
+/// A series born in the sensor, `at` instants: the two-position measurements of a dump see it too, and what the law of the bias then takes
+/// from the windows is no longer in them.
+pub fn in_sensor(scene: &Scene, at: impl Fn(&[f64]) -> Vec<f64>) -> Shape {
+    let windows = at(scene.clock_s());
+    let laws = &scene.case.recording.bias_laws;
+    if laws.iter().all(Vec::is_empty) {
+        return Shape::scalar(windows);
+    }
+    let column = |k: usize| {
+        let mut left = windows.clone();
+        laws[k].iter().for_each(|law| law.take_from(&mut left, &at(&law.measured_s)));
+        std::array::from_fn(|axis| (axis == k).then(|| left.clone()))
+    };
+    Shape::Columns((0..3).map(column).collect())
+}
+
 /// The series of a push that lasts while an entry of the kind does, if the log has it inside the record: entries that overlap
 /// are one push.
 pub fn lasting(scene: &Scene, kind: &str) -> Option<Vec<f64>> {

@@ -3,7 +3,7 @@
 //! What it follows before the log of the temperature begins is one of two, as likely: what the log begins with, or the cycles of the
 //! orbit and the day.
 
-use super::{Effect, Linear, Nonlinear, SELDOM_LARGE, Shape, Theta};
+use super::{Effect, Linear, Nonlinear, SELDOM_LARGE, Shape, Theta, in_sensor};
 use crate::diagnose::case::HALF_WINDOW_S;
 use crate::diagnose::earlier::REACH_S;
 use crate::diagnose::measure::window_means;
@@ -74,7 +74,7 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     } else {
         (&scene.grid_s, &scene.temperature_c)
     };
-    Some(Shape::scalar(window_means(grid_s, temperature_c, scene.clock_s(), theta[0])))
+    Some(in_sensor(scene, |clock_s| window_means(grid_s, temperature_c, clock_s, theta[0])))
 }
 
 fn assumes(scene: &Scene, theta: &Theta) -> Option<String> {

@@ -338,6 +338,7 @@ fn to_come(scene: &Scene, action: Action, hours: f64) -> Option<(Case, Surroundi
             let now = error.last().copied().unwrap_or(0.0);
             error.resize(error.len() + windows, now);
         }
+        recording.bias_laws[k].iter_mut().for_each(|law| law.go_on(windows));
     }
     Some((
         Case {

@@ -83,6 +83,8 @@ pub struct BiasFit {
     pub figures_carried: f64,
     /// Weight of each measurement: 1 in full, 0 an outlier.
     pub weights: Vec<f64>,
+    /// By how much each of the six figures moves where a measurement reads a count more: a row a measurement.
+    pub answers: Vec<[f64; PARAMETERS]>,
     /// Measured less fitted, counts.
     pub residuals: Vec<f64>,
     /// The residual of each against the law given by all others, in standard errors.
@@ -103,6 +105,11 @@ impl BiasFit {
         let [x0, x1] = law.t_h.map(|t_h| met_h / t_h);
         let [e0, e1] = [x0, x1].map(|x| (-x).exp());
         [1.0, e0, e1, temperature_c, law.a[1] * e0 * x0, law.a[2] * e1 * x1]
+    }
+
+    /// Derivatives of the bias by the six figures at a time, hours since lift-off, and a temperature, C.
+    pub fn gradient_at(&self, met_h: f64, temperature_c: f64) -> [f64; PARAMETERS] {
+        Self::gradient(&self.law, met_h, temperature_c)
     }
 
     /// Bias and its standard error, counts; and whether the time is beyond the measurements.
@@ -361,7 +368,12 @@ fn judge(points: &[Point], weights: &[f64], expectation: &Expectation, theta: &D
             }
         })
         .collect();
+    let answer = |(point, weight): (&Point, &f64)| -> [f64; PARAMETERS] {
+        let g = Vector6::from(BiasFit::gradient(&law, point.met_h, point.temperature_c));
+        (covariance * g * (weight / point.sigma_counts.powi(2))).into()
+    };
     let mut fit = BiasFit {
+        answers: points.iter().zip(weights).map(answer).collect(),
         law,
         covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
         drift_variance: 0.0,
