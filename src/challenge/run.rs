@@ -12,7 +12,7 @@ use std::time::Instant;
 use indicatif::ProgressBar;
 use rayon::prelude::*;
 
-use super::conceal::{Concealed, Kind, Manner, Order, draw_order};
+use super::conceal::{Concealed, Kind, Manner, Order, Truth, draw_order};
 use super::score::{Answer, Outcome};
 use super::seal::Seal;
 
@@ -103,8 +103,8 @@ pub fn run_open(directory: &Path, analyser: &dyn Analyser, progress: &ProgressBa
     let outcomes = Mutex::new(Vec::new());
     cases.par_iter().try_for_each(|path| -> io::Result<()> {
         let text = std::fs::read_to_string(path.join("truth.json"))?;
-        let truth = serde_json::from_str(&text).map_err(io::Error::other)?;
-        let (answer, seconds) = timed(analyser, &Material::Directory(path), None);
+        let truth: Truth = serde_json::from_str(&text).map_err(io::Error::other)?;
+        let (answer, seconds) = timed(analyser, &Material::Directory(path), truth.deleted.as_deref());
         progress.inc(1);
         outcomes.lock().unwrap_or_else(|e| e.into_inner()).push(Outcome { truth, answer, seconds });
         Ok(())

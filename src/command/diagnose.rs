@@ -48,7 +48,11 @@ pub struct Args {
 
 /// Orbits, series and poses: recordings of another kind, the same answer in their own unit.
 fn measured(args: &Args) -> anyhow::Result<ExitCode> {
-    for (given, option) in [(args.bootstraps > 0, "--bootstraps"), (!args.without.is_empty(), "--without")] {
+    let other_claim = args.claim_probability != Settings::default().claim_probability;
+    let without = !args.without.is_empty();
+    for (given, option) in
+        [(args.bootstraps > 0, "--bootstraps"), (without, "--without"), (other_claim, "--claim-probability")]
+    {
         if given {
             eprintln!(
                 "oare: {option} is for accelerations against a simulation, and does nothing to a case of this kind"
@@ -96,7 +100,7 @@ fn measured(args: &Args) -> anyhow::Result<ExitCode> {
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let text = std::fs::read_to_string(args.case.join("case.toml")).unwrap_or_default();
-    if MeasuredCase::kind_of(&text).is_some() {
+    if MeasuredCase::kind_of(&text, &args.set).is_some() {
         return measured(&args);
     }
     let analysis = match analyse(&args) {

@@ -7,7 +7,7 @@ use super::case::HALF_WINDOW_S;
 use super::catalogue::Shape;
 use super::design::{Chosen, Column, Frame, Raw};
 use super::instants::still_warm;
-use super::measure::coverage;
+use super::measure::{coverage, union};
 use super::open_form::orbit_angles;
 use super::scene::{Axes, Scene};
 use super::search::{Entry, Set};
@@ -109,7 +109,7 @@ fn covariates(s: &Scene) -> Vec<Covariate> {
     let time: Vec<f64> = clock_s.iter().map(|t| 2.0 * (t - start) / (end - start) - 1.0).collect();
     add("the time squared, from the middle of the record", time.iter().map(|t| t * t).collect());
     add("the time", time);
-    add("the crew's sleep", coverage(clock_s, &s.case.spans("crew_sleep")));
+    add("the crew's sleep", coverage(clock_s, &union(s.case.spans("crew_sleep"))));
     add("the sunlight", s.measure_scalar(|g| s.sunlit[g]));
     add("the sensor temperature", s.measure_scalar(|g| s.temperature_c[g]));
     add("the density", s.measure_scalar(|g| s.case.ancillary.density_kg_m3[g]));

@@ -93,6 +93,16 @@ pub enum CaseError {
         /// Highest credible.
         high: f64,
     },
+    /// A column that is there more than once.
+    #[error("{file}: the header has the column `{column}` {times} times")]
+    RepeatedColumn {
+        /// File.
+        file: String,
+        /// Column.
+        column: String,
+        /// How many times.
+        times: usize,
+    },
     /// A value that nothing can have.
     #[error("{file}, line {line}: `{column}` is {found:.3e}, and {unit} between {low:e} and {high:e} is expected")]
     Beyond {
@@ -246,6 +256,7 @@ impl CaseError {
             Self::MissingFile { file }
             | Self::Unreadable { file, .. }
             | Self::MissingColumn { file, .. }
+            | Self::RepeatedColumn { file, .. }
             | Self::NotANumber { file, .. }
             | Self::Csv { file, .. }
             | Self::TimeOrder { file, .. }

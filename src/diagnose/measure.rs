@@ -74,6 +74,23 @@ impl Measurement {
     }
 }
 
+/// What follows a series with a time constant, the series being linear between its grid points; it begins as the series does.
+pub fn relaxing(grid: &[f64], series: &[f64], tau_s: f64) -> Vec<f64> {
+    let mut out = Vec::with_capacity(series.len());
+    let mut state = series.first().copied().unwrap_or(0.0);
+    for (i, value) in series.iter().enumerate() {
+        if i > 0 {
+            let dt = grid[i] - grid[i - 1];
+            let decay = (-dt / tau_s).exp();
+            // Of a ramp over the step, the end counts by `ramp` and the beginning by what is left of the step's own share.
+            let ramp = 1.0 - (1.0 - decay) * tau_s / dt;
+            state = state * decay + value * ramp + series[i - 1] * (1.0 - decay - ramp);
+        }
+        out.push(state);
+    }
+    out
+}
+
 /// Window means as [`Measurement`] gives them, at any offset of the clock: one that runs ahead by `ahead_s` labels late. From the integral
 /// of the series, since weights serve one offset alone.
 pub fn window_means(grid: &[f64], series: &[f64], clock_s: &[f64], ahead_s: f64) -> Vec<f64> {

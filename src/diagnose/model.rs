@@ -70,7 +70,10 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
                 theta_next += 1;
                 // Not finite where a step changes nothing, as for an onset in a hole of the record.
                 let curvature = joint.get((theta_next - 1, theta_next - 1)).map(|v| v.max(0.0).sqrt());
-                curvature.filter(|s| s.is_finite()).unwrap_or(m.theta_sigma[j]) * inflation
+                let sigma = curvature.filter(|s| s.is_finite()).unwrap_or(m.theta_sigma[j]);
+                // Of several peaks the joint fit sees the curvature of one.
+                let sigma = if p.atom.is_some() { sigma.max(m.theta_sigma[j]) } else { sigma };
+                sigma * inflation
             } else {
                 LOG_S
             };

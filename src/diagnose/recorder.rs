@@ -183,6 +183,7 @@ pub fn case(file: impl Fn(&str) -> Result<Option<Vec<u8>>, CaseError>, set: &[St
         "recorder_dump" => {
             let missing = || CaseError::MissingFile { file: files.recording.clone() };
             let dump = named(&files.recording)?.ok_or_else(missing)?;
+            unpacked(&files.recording, &dump)?;
             let recording = recorded(&dump, &header);
             if recording.clock_s.is_empty() {
                 return Err(CaseError::NoWindows { file: files.recording, octets: dump.len() });
@@ -193,11 +194,22 @@ pub fn case(file: impl Fn(&str) -> Result<Option<Vec<u8>>, CaseError>, set: &[St
     }
 }
 
+/// Whether a file is as it is told, and not packed for its way.
+fn unpacked(name: &str, octets: &[u8]) -> Result<(), CaseError> {
+    const PACKED: [(&[u8], &str); 4] =
+        [(b"\x1f\x8b", "gzip"), (b"PK\x03\x04", "zip"), (b"\x28\xb5\x2f\xfd", "zstd"), (b"\xfd7zXZ", "xz")];
+    match PACKED.into_iter().find(|(begins, _)| octets.starts_with(begins)) {
+        Some((_, by)) => Err(CaseError::Unreadable { file: name.into(), reason: format!("it is packed by {by}") }),
+        None => Ok(()),
+    }
+}
+
 /// The text in the octets of a file.
 ///
 /// # Errors
 /// The first octet that is none of a text.
 pub fn text(name: &str, octets: Vec<u8>) -> Result<String, CaseError> {
+    unpacked(name, &octets)?;
     String::from_utf8(octets).map_err(|error| CaseError::Unreadable {
         file: name.into(),
         reason: format!("octet {} is no UTF-8 text", error.utf8_error().valid_up_to() + 1),
@@ -209,8 +221,26 @@ pub fn recorded(dump: &[u8], header: &Header) -> Recording {
     let time = MissionTime { epoch_utc: header.epoch_utc, liftoff_clock_s: header.liftoff_clock_s };
     let settings = Settings { time, ..Settings::sts65() };
     let station = replay(&settings, None, |station| take(station, &settings, dump));
-    usable(&station).recording
+    let mut recording = usable(&station).recording;
+    recording.notes.extend(of_another_epoch(&station, &time));
+    recording
 }
+
+/// Records whose own UTC is not that of the clock with the epoch of the case: Sun and shadow would be those of another day.
+fn of_another_epoch(station: &Station, time: &MissionTime) -> Option<String> {
+    let piece = station.derived().time_correlation.pieces.first()?;
+    let expected_s = time.epoch_utc.as_duration().as_secs_f64();
+    let off_s = piece.offset_s - expected_s;
+    (off_s.abs() > EPOCH_OFF_S).then(|| {
+        format!(
+            "the records themselves have UTC {off_s:+.0} s from that of case.epoch_utc: Sun, shadow and geomagnetic field are those of \
+             the latter"
+        )
+    })
+}
+
+/// The Orbiter's clock is set to UTC: beyond a minute it is another epoch, s.
+const EPOCH_OFF_S: f64 = 60.0;
 
 fn take(station: &mut Station, settings: &Settings, dump: &[u8]) {
     let mut reader = PlaybackReader::new(settings.link);

@@ -12,7 +12,7 @@ use crate::units::NANO_G_M_S2;
 use super::case::{Case, Expectation, HALF_WINDOW_S};
 use super::earlier;
 use super::error::CaseError;
-use super::measure::{Measurement, coverage};
+use super::measure::{Measurement, coverage, union};
 use super::noise::{self, Contradicted, Loudness, Schedule};
 
 /// One series per body axis.
@@ -297,7 +297,7 @@ impl<'a> Scene<'a> {
 
 /// Whether the crew sleeps, by its log, for most of each window.
 fn asleep(case: &Case) -> Vec<bool> {
-    coverage(&case.recording.clock_s, &case.spans("crew_sleep")).iter().map(|share| *share > 0.5).collect()
+    coverage(&case.recording.clock_s, &union(case.spans("crew_sleep"))).iter().map(|share| *share > 0.5).collect()
 }
 
 fn bodies(q: &[[f64; 4]]) -> Result<Vec<Mat3>, CaseError> {

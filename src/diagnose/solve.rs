@@ -256,9 +256,10 @@ impl Pool {
         let weigh = |sets: Vec<Set>, count: usize| -> Option<Vec<Weighed>> {
             let top = sets.first().map_or(0.0, |s| s.score);
             let worth = top > WORTH_A_REFIT;
-            let keep = sets.into_iter().filter(|s| s.score > top - 14.0).take(if worth { count } else { 1 });
+            let near = sets.into_iter().filter(|s| s.score > top - 14.0).collect();
+            let keep = varied(near, if worth { count } else { 1 });
             let rounds = if worth { 2 } else { 1 };
-            let mut weighed = shared_work::map(&keep.collect::<Vec<Set>>(), |s| {
+            let mut weighed = shared_work::map(&keep, |s| {
                 (!stop()).then(|| search::weigh_with_own_noise(scene, entries, s, &self.noise, rounds, 40))
             })
             .into_iter()
@@ -364,11 +365,26 @@ fn merge(sets: &mut Vec<Weighed>, more: Vec<Weighed>) {
     });
 }
 
+/// The best so many of sets in order, and for each entry that all of these have the best set behind them that does without: whatever joins
+/// one effect must not keep its rivals out.
+fn varied(mut sets: Vec<Set>, count: usize) -> Vec<Set> {
+    let rest = sets.split_off(count.min(sets.len()));
+    let Some(first) = sets.first() else { return sets };
+    let common: Vec<usize> = first.key().into_iter().filter(|e| sets.iter().all(|s| s.key().contains(e))).collect();
+    for entry in common {
+        let without = rest.iter().find(|s| !s.key().contains(&entry));
+        if let Some(set) = without.filter(|set| !sets.iter().any(|s| s.key() == set.key())) {
+            sets.push(set.clone());
+        }
+    }
+    sets
+}
+
 /// Refine the best sets at one noise, and sort again.
 fn polish(scene: &Scene, frame: &Frame, entries: &[Entry], sets: &mut Vec<Set>, count: usize) {
     let top = sets.first().map_or(0.0, |s| s.score);
     sets.retain(|s| s.score > top - 16.0);
-    sets.truncate(count);
+    *sets = varied(std::mem::take(sets), count);
     if top > WORTH_A_REFIT {
         *sets = shared_work::map(sets, |set| {
             let mut set = set.clone();

@@ -117,7 +117,7 @@ pub enum RealError {
 pub fn folders(dir: &Path) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(dir) else { return Vec::new() };
     let holds = |path: &PathBuf| {
-        std::fs::read_to_string(path.join("case.toml")).is_ok_and(|text| MeasuredCase::kind_of(&text).is_some())
+        std::fs::read_to_string(path.join("case.toml")).is_ok_and(|text| MeasuredCase::kind_of(&text, &[]).is_some())
     };
     let mut found: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(holds).collect();
     found.sort();

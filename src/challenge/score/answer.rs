@@ -38,6 +38,28 @@ pub struct Answer {
     pub fit: Option<Fit>,
 }
 
+impl Answer {
+    /// In place of an answer that there is not.
+    pub(super) fn none() -> Self {
+        Self {
+            verdict: String::new(),
+            false_alarm_probability: None,
+            statistic: None,
+            slow_evidence: None,
+            effects: Vec::new(),
+            alternatives: Vec::new(),
+            cannot_tell_apart: Vec::new(),
+            hypothesis: None,
+            fit: None,
+        }
+    }
+
+    /// Whether it stands in place of one.
+    pub(super) fn is_none(&self) -> bool {
+        self.verdict.is_empty()
+    }
+}
+
 /// One named effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Named {

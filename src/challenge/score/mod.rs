@@ -51,14 +51,16 @@ pub struct Score {
 
 /// Scores outcomes.
 pub fn score(outcomes: &[Outcome]) -> Score {
-    let answered: Vec<(&Truth, &Answer)> =
-        outcomes.iter().filter_map(|o| o.answer.as_ref().ok().map(|a| (&o.truth, a))).collect();
+    // A case without an answer is no hit in any rate that its truth belongs to.
+    let none = Answer::none();
+    let all: Vec<Pair> = outcomes.iter().map(|o| (&o.truth, o.answer.as_ref().unwrap_or(&none))).collect();
+    let answered: Vec<Pair> = outcomes.iter().filter_map(|o| Some((&o.truth, o.answer.as_ref().ok()?))).collect();
     let failed =
         outcomes.iter().filter_map(|o| o.answer.as_ref().err().map(|e| (o.truth.case.clone(), e.clone()))).collect();
     Score {
         cases: outcomes.len(),
         failed,
-        rates: rates(&answered),
+        rates: rates(&all),
         mean_set_size: mean_set_size(&answered),
         excess_removed: excess_removed(&answered),
         null_statistics: [true, false].map(|quiet| null_statistics(&answered, quiet)),
@@ -79,7 +81,7 @@ fn rates(all: &[Pair]) -> Vec<Rate> {
     let plain = |low: f64, high: f64| {
         move |p: &&Pair| p.0.kind == "one" && (low..high).contains(&p.0.snr_min()) && p.0.is_identifiable()
     };
-    let alarm = |p: &Pair| p.1.verdict != "consistent";
+    let alarm = |p: &Pair| !p.1.is_none() && p.1.verdict != "consistent";
     let first = |p: &Pair| p.1.first().is_some_and(|id| p.0.effects.contains_key(id));
     let exact = |p: &Pair| p.1.named() == p.0.ids().into_iter().collect::<BTreeSet<_>>();
     let inside = |p: &Pair| p.1.sets().contains(&p.0.ids().into_iter().collect::<BTreeSet<_>>());
@@ -116,7 +118,8 @@ fn rates(all: &[Pair]) -> Vec<Rate> {
         of(&|p| listed(p) && p.0.snr_min() >= 5.0, &unexplained, "listed effect called unlisted", "<= 2 %"),
         of(&kind(&["single"]), &honest, "unidentifiable: declared ambiguous, truth in the set", "95 %"),
     ];
-    let checks: Vec<(String, bool)> = all.iter().flat_map(|p| answer::within_two_sigma(p.0, p.1)).collect();
+    let answered = all.iter().filter(|p| !p.1.is_none());
+    let checks: Vec<(String, bool)> = answered.flat_map(|p| answer::within_two_sigma(p.0, p.1)).collect();
     rates.push(Rate::over(
         "parameters within 2 sigma",
         "95.4 +- 1.5 %",

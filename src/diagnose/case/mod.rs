@@ -59,6 +59,8 @@ pub struct Recording {
     pub bias_laws: [Vec<FittedLaw>; 3],
     /// What was wrong with the instrument, as far as its own dump tells.
     pub faults: Vec<Fault>,
+    /// What else its records tell against the case.
+    pub notes: Vec<String>,
 }
 
 /// A fault of the instrument that the calibration found in a dump.
@@ -135,6 +137,8 @@ pub struct Case {
     pub expected: Arc<Expectation>,
     /// The recording.
     pub recording: Recording,
+    /// Windows of the span asked for that are before or after the simulation or the ancillary data.
+    pub windows_beyond: usize,
     /// Windows left out because simulation or ancillary data have a hole there.
     pub windows_in_holes: usize,
     /// Windows left out because the simulation's grid is too coarse for its own signal there.
@@ -268,6 +272,7 @@ impl Case {
         check::recording(&files.recording, &recording)?;
         let common = |grid: &[f64]| [grid[0] + HALF_WINDOW_S, grid[grid.len() - 1] - HALF_WINDOW_S];
         let mut kept = recording;
+        let asked = within(&kept, expected.header.span_s).clock_s.len();
         for (file, span) in [
             ("case.toml", expected.header.span_s),
             (&files.simulation, common(&expected.simulation.clock_s)),
@@ -287,6 +292,7 @@ impl Case {
                 });
             }
         }
+        let windows_beyond = asked - kept.clock_s.len();
         check::recording(&files.recording, &kept)?;
         let coarse = |file: &str, kept: &Recording| {
             let common = kept.clock_s.len();
@@ -317,7 +323,7 @@ impl Case {
             kept = alike;
         }
         let windows_of_spikes = before - kept.clock_s.len();
-        Ok(Self { expected, recording: kept, windows_in_holes, windows_too_rough, windows_of_spikes })
+        Ok(Self { expected, recording: kept, windows_beyond, windows_in_holes, windows_too_rough, windows_of_spikes })
     }
 }
 
@@ -341,6 +347,7 @@ fn take(recording: &Recording, keep: &[usize]) -> Recording {
         bias_errors_ng: recording.bias_errors_ng.each_ref().map(|axis| axis.iter().map(pick).collect()),
         bias_laws: recording.bias_laws.each_ref().map(|axis| axis.iter().map(|law| law.at(keep)).collect()),
         faults: recording.faults.clone(),
+        notes: recording.notes.clone(),
     }
 }
 
@@ -368,8 +375,19 @@ const ROUGH_STRETCHES_MAX: usize = 30;
 /// Share of the windows that must be smooth where there are more of them: as many firings again may lie between two rows and show in none.
 const SMOOTH_SHARE: f64 = 0.9;
 
-/// The windows in which the simulation's grid resolves its own signal, and how many stretches are left out: between grid points it is
-/// known to about an eighth of the second difference, and where that is not small against the noise a comparison says nothing.
+/// What a straight line between grid points may miss of a series beside point `i`: of a parabola through it and its neighbours, in the
+/// longer of its two steps. Nothing is known of that at the ends.
+fn bend(grid: &[f64], series: &[f64], i: usize) -> f64 {
+    if i == 0 || i + 1 == grid.len() {
+        return 0.0;
+    }
+    let [before, after] = [grid[i] - grid[i - 1], grid[i + 1] - grid[i]];
+    let straight = (series[i - 1] * after + series[i + 1] * before) / (before + after);
+    (series[i] - straight).abs() * before.max(after).powi(2) / (4.0 * before * after)
+}
+
+/// The windows in which the simulation's grid resolves its own signal, and how many stretches are left out: where what it misses between
+/// its points is not small against the noise a comparison says nothing.
 fn smooth_enough(recording: &Recording, simulation: &Simulation) -> (Recording, usize) {
     let grid = &simulation.clock_s;
     let noise: [f64; 3] = std::array::from_fn(|k| {
@@ -380,13 +398,7 @@ fn smooth_enough(recording: &Recording, simulation: &Simulation) -> (Recording, 
         middle.iter().copied().find(|step| *step > 0.0).unwrap_or(f64::INFINITY)
     });
     let rough: Vec<bool> = (0..grid.len())
-        .map(|i| {
-            let [a, b] = [i.saturating_sub(1), (i + 1).min(grid.len() - 1)];
-            (0..3).any(|k| {
-                let m = &simulation.a_ng[k];
-                (m[a] - 2.0 * m[i] + m[b]).abs() / 8.0 > ROUGHNESS_MAX * noise[k]
-            })
-        })
+        .map(|i| (0..3).any(|k| bend(grid, &simulation.a_ng[k], i) > ROUGHNESS_MAX * noise[k]))
         .collect();
     let touched = |t: f64| {
         let first = grid.partition_point(|g| *g < t - HALF_WINDOW_S).saturating_sub(1);
@@ -400,4 +412,21 @@ fn smooth_enough(recording: &Recording, simulation: &Simulation) -> (Recording, 
 
 fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slope_is_no_bend_however_far_apart_the_rows_are() {
+        let grid = [0.0, 20.0, 40.0, 180.0, 200.0];
+        let line = grid.map(|t| 3.0 - 0.9 * t);
+        assert!((0..5).all(|i| bend(&grid, &line, i) < 1e-12));
+        // Half the square of t misses an eighth of the square of a step in its middle.
+        let parabola = grid.map(|t| 0.5 * t * t);
+        for (i, step_s) in [(1, 20.0_f64), (2, 140.0), (3, 140.0)] {
+            assert!((bend(&grid, &parabola, i) - step_s.powi(2) / 8.0).abs() < 1e-9);
+        }
+    }
 }

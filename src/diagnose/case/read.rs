@@ -46,11 +46,13 @@ fn table(text: &str) -> csv::Reader<&[u8]> {
 /// Columns of a CSV by name, every cell a finite number.
 fn columns(file: &str, text: &str, names: &[&str]) -> Result<Vec<Vec<f64>>, CaseError> {
     let mut reader = table(text);
-    let csv_error = |e: csv::Error| CaseError::Csv { file: file.into(), reason: one_line(&e.to_string()) };
+    let csv_error = |e: csv::Error| unread(file, &e);
     let header = reader.headers().map_err(csv_error)?.clone();
-    let places =
-        names.iter().map(|name| header.iter().position(|h| h == *name).ok_or_else(|| missing(file, name, &header)));
-    let places = places.collect::<Result<Vec<usize>, _>>()?;
+    let place = |name: &&str| match header.iter().filter(|h| h == name).count() {
+        0 | 1 => header.iter().position(|h| h == *name).ok_or_else(|| missing(file, name, &header)),
+        times => Err(CaseError::RepeatedColumn { file: file.into(), column: name.to_string(), times }),
+    };
+    let places = names.iter().map(place).collect::<Result<Vec<usize>, _>>()?;
     let mut out = vec![Vec::new(); names.len()];
     for (row, record) in reader.records().enumerate() {
         let record = record.map_err(csv_error)?;
@@ -72,12 +74,27 @@ fn columns(file: &str, text: &str, names: &[&str]) -> Result<Vec<Vec<f64>>, Case
     Ok(out)
 }
 
+/// A line that is no row of the table.
+fn unread(file: &str, error: &csv::Error) -> CaseError {
+    let reason = match error.kind() {
+        csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
+            let line = pos.as_ref().map_or_else(String::new, |pos| format!("line {}: ", pos.line()));
+            format!("{line}{len} cells, and the header has {expected_len}")
+        }
+        _ => one_line(&error.to_string()),
+    };
+    CaseError::Csv { file: file.into(), reason }
+}
+
 /// A column that is not in a header: that may be no header, or a line of a file that is no text.
 fn missing(file: &str, column: &str, header: &csv::StringRecord) -> CaseError {
     const SHOWN: usize = 300;
     let found: String = header.iter().collect::<Vec<_>>().join(", ").escape_debug().take(SHOWN + 1).collect();
-    let found =
+    let mut found =
         if found.chars().count() > SHOWN { found.chars().take(SHOWN).chain("...".chars()).collect() } else { found };
+    if header.len() == 1 && header[0].contains([';', '\t']) {
+        found += " (commas are expected between the cells)";
+    }
     CaseError::MissingColumn { file: file.into(), column: column.into(), found }
 }
 
@@ -146,10 +163,13 @@ pub fn ancillary(file: &str, text: &str) -> Result<Ancillary, CaseError> {
     })
 }
 
+/// No entry of a log lasts longer, s: a century.
+const LONGEST_S: f64 = 3e9;
+
 fn events(file: &str, text: &str) -> Result<Vec<Event>, CaseError> {
     let c = columns(file, text, &["clock_s", "duration_s"])?;
     let mut reader = table(text);
-    let csv_error = |e: csv::Error| CaseError::Csv { file: file.into(), reason: one_line(&e.to_string()) };
+    let csv_error = |e: csv::Error| unread(file, &e);
     let header = reader.headers().map_err(csv_error)?.clone();
     let place = |name: &str| header.iter().position(|h| h == name);
     let kind = place("kind").ok_or_else(|| missing(file, "kind", &header))?;
@@ -157,9 +177,15 @@ fn events(file: &str, text: &str) -> Result<Vec<Event>, CaseError> {
     let mut events = Vec::new();
     for (i, record) in reader.records().enumerate() {
         let record = record.map_err(csv_error)?;
+        let duration_s = c[1][i];
+        if duration_s < 0.0 {
+            let (line, column, unit) = (i + 2, "duration_s".into(), "s");
+            let file = file.into();
+            return Err(CaseError::Beyond { file, line, column, found: duration_s, unit, low: 0.0, high: LONGEST_S });
+        }
         events.push(Event {
             clock_s: c[0][i],
-            duration_s: c[1][i].max(0.0),
+            duration_s,
             kind: record[kind].to_string(),
             detail: detail.and_then(|d| record.get(d)).unwrap_or_default().to_string(),
         });

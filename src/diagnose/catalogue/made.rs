@@ -63,9 +63,12 @@ pub fn simulated_ng(t: f64) -> Vector3<f64> {
     Vector3::new(100.0 * phase.sin(), 60.0 * phase.cos(), 30.0 + 40.0 * (2.0 * phase).sin())
 }
 
+/// Its temperature swings in this time, s.
+pub const TEMPERATURE_PERIOD_S: f64 = 5400.0;
+
 /// The temperature of the sensor, C.
 pub fn temperature_c(t: f64) -> f64 {
-    20.0 + 3.0 * (TAU * (t - START_S) / 5400.0).cos()
+    20.0 + 3.0 * (TAU * (t - START_S) / TEMPERATURE_PERIOD_S).cos()
 }
 
 /// The case.

@@ -1,19 +1,21 @@
-//! Bias follows the sensor temperature, perhaps late.
+//! Bias follows the sensor temperature, perhaps late: by a delay, or as what is warmed through a resistance, with a time constant.
 //!
-//! What it follows before the log of the temperature begins is one of two, as likely: what the log begins with, or the cycles of the
-//! orbit and the day.
+//! What a delayed one follows before the log of the temperature begins is one of two, as likely: what the log begins with, or the cycles
+//! of the orbit and the day. One with a time constant has followed those cycles.
+
+use std::borrow::Cow;
 
 use super::{Effect, Linear, Nonlinear, SELDOM_LARGE, Shape, Theta, in_sensor};
 use crate::diagnose::case::HALF_WINDOW_S;
 use crate::diagnose::earlier::REACH_S;
-use crate::diagnose::measure::window_means;
+use crate::diagnose::measure::{relaxing, window_means};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
 pub const EFFECT: Effect = Effect {
     id: "temperature_bias",
     name: "Bias follows temperature",
-    equation: "slope x T(t - lag)",
+    equation: "slope x T(t - lag), or slope x T relaxing in the lag",
     source: "4-30 counts per C, lagged 0-8 h",
     covariate: "temperature",
     mistaken_for: &["solar_radiation_pressure", "crew_activity", "bias_drift"],
@@ -43,9 +45,14 @@ pub const EFFECT: Effect = Effect {
 /// Longest lag, s.
 const LAG_S_MAX: f64 = REACH_S;
 
-/// Before the log there was what it begins with, or what its cycles tell: the second number of a theta.
+/// The second number of a theta. A delay, and before the log there was what it begins with, or what its cycles tell; or a time constant.
 const AS_IT_BEGINS: f64 = 0.0;
 const AS_ITS_CYCLES: f64 = 1.0;
+const RELAXING: f64 = 2.0;
+
+/// Time constants tried first, s.
+const TAUS_S: [f64; 12] =
+    [200.0, 400.0, 700.0, 1200.0, 2000.0, 3300.0, 5400.0, 8400.0, 12_000.0, 16_500.0, 22_000.0, 28_800.0];
 
 /// Lag up to which the log says all that is felt, s.
 fn logged(scene: &Scene) -> f64 {
@@ -56,11 +63,12 @@ fn grid(scene: &Scene) -> Vec<Theta> {
     // The cycle of the orbit has a peak of the likelihood at every one of its periods: six to each.
     let lags = || [0.0, 300.0, 600.0].into_iter().chain((1..=32).map(|k| 900.0 * f64::from(k)));
     let beyond = lags().filter(|lag| *lag > logged(scene));
-    lags().map(|lag| [lag, AS_IT_BEGINS]).chain(beyond.map(|lag| [lag, AS_ITS_CYCLES])).collect()
+    let delayed = lags().map(|lag| [lag, AS_IT_BEGINS]).chain(beyond.map(|lag| [lag, AS_ITS_CYCLES]));
+    delayed.chain(TAUS_S.map(|tau| [tau, RELAXING])).collect()
 }
 
 fn log_density(scene: &Scene, theta: &Theta) -> f64 {
-    let ways: f64 = if theta[0] > logged(scene) { 2.0 } else { 1.0 };
+    let ways: f64 = if theta[0] > logged(scene) { 3.0 } else { 2.0 };
     -(ways * LAG_S_MAX).ln()
 }
 
@@ -68,16 +76,27 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     if !(0.0..=LAG_S_MAX).contains(&theta[0]) {
         return None;
     }
-    let (grid_s, temperature_c) = if theta[1] == AS_ITS_CYCLES {
-        let longer = &scene.temperature_and_earlier;
-        (&longer.grid_s, &longer.values)
-    } else {
-        (&scene.grid_s, &scene.temperature_c)
+    let longer = &scene.temperature_and_earlier;
+    let (grid_s, temperature_c, delay_s) = match theta[1] {
+        RELAXING => (&longer.grid_s, Cow::Owned(relaxing(&longer.grid_s, &longer.values, theta[0])), 0.0),
+        AS_ITS_CYCLES => (&longer.grid_s, Cow::Borrowed(&longer.values), theta[0]),
+        _ => (&scene.grid_s, Cow::Borrowed(&scene.temperature_c), theta[0]),
     };
-    Some(in_sensor(scene, |clock_s| window_means(grid_s, temperature_c, clock_s, theta[0])))
+    // About its mean: a constant is nuisance, and where the mismatch is largest must not hang on the zero of the scale.
+    let mean_c = scene.temperature_c.iter().sum::<f64>() / scene.temperature_c.len() as f64;
+    let about_mean = |clock_s: &[f64]| {
+        window_means(grid_s, &temperature_c, clock_s, delay_s).into_iter().map(|t| t - mean_c).collect()
+    };
+    Some(in_sensor(scene, about_mean))
 }
 
 fn assumes(scene: &Scene, theta: &Theta) -> Option<String> {
+    if theta[1] == RELAXING {
+        return Some(format!(
+            "the lag of {:.0} s is a time constant with which the temperature is followed, and no delay",
+            theta[0]
+        ));
+    }
     let begins_s = scene.grid_s[0] + theta[0] + HALF_WINDOW_S;
     let before = scene.clock_s().iter().filter(|t| **t < begins_s).count();
     let taken_for =
@@ -102,11 +121,25 @@ mod tests {
     fn it_is_the_temperature_as_late_as_its_lag() {
         let case = made::case();
         let scene = Scene::new(&case).unwrap();
+        let mean_c = scene.temperature_c.iter().sum::<f64>() / scene.temperature_c.len() as f64;
         for lag_s in [0.0, 500.0] {
             for (axis, column) in made::columns(&scene, &EFFECT, [lag_s, AS_IT_BEGINS]).iter().enumerate() {
-                made::is_everywhere(&scene, column, |t| Vector3::ith(axis, made::temperature_c(t - lag_s)));
+                let about_mean = |t: f64| made::temperature_c(t - lag_s) - mean_c;
+                made::is_everywhere(&scene, column, |t| Vector3::ith(axis, about_mean(t)));
             }
         }
+        // A swing of one period that is relaxed to: smaller by the root of 1 + (w tau)^2, and later by atan(w tau), hours after it began.
+        let (tau_s, w) = (2000.0, std::f64::consts::TAU / made::TEMPERATURE_PERIOD_S);
+        let relaxed = |t: f64| {
+            let size = (1.0 + (w * tau_s).powi(2)).sqrt().recip();
+            20.0 + size * (made::temperature_c(t - (w * tau_s).atan() / w) - 20.0)
+        };
+        let columns = made::columns(&scene, &EFFECT, [tau_s, RELAXING]);
+        for t in [110_000.0, 113_000.0, 116_000.0] {
+            let found = made::at(&scene, &columns[1][1], t);
+            assert!((found - (relaxed(t) - mean_c)).abs() < 0.02, "{found} at {t}, {} expected", relaxed(t) - mean_c);
+        }
+        assert!(assumes(&scene, &[500.0, RELAXING]).is_some_and(|said| said.contains("time constant")));
         assert!(assumes(&scene, &[500.0, AS_IT_BEGINS]).is_none(), "the log begins ten minutes before the record");
         assert!(assumes(&scene, &[2000.0, AS_IT_BEGINS]).is_some_and(|said| said.contains("2000 s late")));
     }

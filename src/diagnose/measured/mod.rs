@@ -94,9 +94,12 @@ pub struct MeasuredCase {
 }
 
 impl MeasuredCase {
-    /// The kind named in a `case.toml`, if it is one of these.
-    pub fn kind_of(text: &str) -> Option<Kind> {
-        let table: toml::Table = text.parse().ok()?;
+    /// The kind named in a `case.toml` with overrides, if it is one of these.
+    pub fn kind_of(text: &str, overrides: &[String]) -> Option<Kind> {
+        let mut table: toml::Table = text.parse().ok()?;
+        for one in overrides {
+            keys::set(&mut table, one)?;
+        }
         kind(&table)
     }
 

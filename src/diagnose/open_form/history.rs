@@ -5,7 +5,7 @@ use std::ops::{Add, Mul, Sub};
 use super::Collector;
 use crate::diagnose::case::HALF_WINDOW_S;
 use crate::diagnose::instants::{manoeuvres, still_warm, terminators};
-use crate::diagnose::measure::{coverage, decay, weighted_coverage};
+use crate::diagnose::measure::{coverage, decay, union, weighted_coverage};
 use crate::diagnose::scene::Scene;
 use crate::math::robust::median;
 use crate::physics::Vec3;
@@ -76,7 +76,8 @@ pub(super) fn events(c: &mut Collector) {
     let s = c.scene;
     for kind in s.case.kinds_tried() {
         let spans = s.case.spans(kind);
-        let starts: Vec<(f64, f64)> = spans.iter().map(|x| (x[0], 1.0)).collect();
+        let mut starts: Vec<(f64, f64)> = spans.iter().map(|x| (x[0], 1.0)).collect();
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut ends: Vec<(f64, f64)> = spans.iter().map(|x| (x[1], 1.0)).collect();
         ends.sort_by(|a, b| a.0.total_cmp(&b.0));
         for tau in EVENT_TAUS_S {
@@ -107,7 +108,7 @@ pub(super) fn events(c: &mut Collector) {
             c.family("time_since_event", "between logged events", ramps(s, kind, what, list));
         }
         if !begins_once(s, &starts, 0.0) {
-            let so_far = |t: &f64| starts.iter().filter(|x| x.0 <= *t).count() as f64;
+            let so_far = |t: &f64| starts.partition_point(|x| x.0 <= *t) as f64;
             let count = s.clock_s().iter().map(so_far).collect();
             c.windows(format!("number of {kind} so far"), "time_since_event", "after logged events", count);
         }
@@ -116,7 +117,7 @@ pub(super) fn events(c: &mut Collector) {
                 format!("{kind} lasts"),
                 "time_since_event",
                 "during logged events",
-                coverage(s.clock_s(), &spans),
+                coverage(s.clock_s(), &union(spans)),
             );
         }
     }
@@ -241,10 +242,8 @@ fn ramps(s: &Scene, kind: &str, what: &str, instants: &[(f64, f64)]) -> Vec<(Str
 
 /// Time since the last of the instants, days, and since `before` ahead of the first.
 fn ramp(clock_s: &[f64], instants: &[(f64, f64)], before: f64) -> Vec<f64> {
-    clock_s
-        .iter()
-        .map(|t| (t - instants.iter().map(|x| x.0).filter(|x| x <= t).fold(before, f64::max)) / 86_400.0)
-        .collect()
+    let last = |t: f64| instants[..instants.partition_point(|x| x.0 <= t)].last().map_or(before, |x| x.0.max(before));
+    clock_s.iter().map(|t| (t - last(*t)) / 86_400.0).collect()
 }
 
 pub(super) fn clock(c: &mut Collector) {

@@ -24,8 +24,8 @@ fn right_ascension_rad(c: &Collector) -> Vec<f64> {
 fn circles(c: &mut Collector) {
     let s = c.scene;
     let (u, noon) = super::motion::angles(s);
-    let sun_ra = sun::right_ascension_rad(s.case.header.unix_s(s.grid_s[0]));
-    let local: Vec<f64> = right_ascension_rad(c).iter().map(|a| a - sun_ra).collect();
+    let sun_rad = |t: &f64| sun::right_ascension_rad(s.case.header.unix_s(*t));
+    let local: Vec<f64> = right_ascension_rad(c).iter().zip(&s.grid_s).map(|(a, t)| a - sun_rad(t)).collect();
     for (name, covariate, angle) in [
         ("u", "argument_of_latitude", &u),
         ("u - u_noon", "sun_phase", &noon),

@@ -66,7 +66,10 @@ pub(super) fn surroundings(c: &mut Collector) {
     let unix: Vec<f64> = s.grid_s.iter().map(|t| s.case.header.unix_s(*t)).collect();
     let ascension: Vec<f64> = s.r_m.iter().map(|r| r.y.atan2(r.x)).collect();
     let longitude: Vec<f64> = ascension.iter().zip(&unix).map(|(a, t)| a - time::gmst_rad(*t)).collect();
-    let sun_ra = sun::right_ascension_rad(unix[0]);
+    // Twelve hours where the Sun is overhead.
+    let local: Vec<f64> =
+        ascension.iter().zip(&unix).map(|(a, t)| a - sun::right_ascension_rad(*t) + std::f64::consts::PI).collect();
+    let mean_s = s.grid_s.iter().sum::<f64>() / s.grid_s.len() as f64;
     let place = "a height, latitude or local time";
     c.grid("rho", "density", place, |g| rho[g]);
     c.grid("rho^2", "density", place, |g| rho[g] * rho[g]);
@@ -90,23 +93,21 @@ pub(super) fn surroundings(c: &mut Collector) {
             format!("sin {k}LT, cos {k}LT"),
             "local_time",
             place,
-            &[&|g| (n * (ascension[g] - sun_ra)).sin(), &|g| (n * (ascension[g] - sun_ra)).cos()],
+            &[&|g| (n * local[g]).sin(), &|g| (n * local[g]).cos()],
         );
     }
-    c.grid("tanh(4 sin(LT))", "local_time", place, |g| (4.0 * (ascension[g] - sun_ra).sin()).tanh());
-    c.grid("tanh(4 cos(LT))", "local_time", place, |g| (4.0 * (ascension[g] - sun_ra).cos()).tanh());
+    c.grid("tanh(4 sin(LT))", "local_time", place, |g| (4.0 * local[g].sin()).tanh());
+    c.grid("tanh(4 cos(LT))", "local_time", place, |g| (4.0 * local[g].cos()).tanh());
     let along = "along the drag";
     c.vectors("a_d rho/<rho>", "density", along, &[&|g| s.drag_ng[g] * (rho[g] / mean_rho)]);
     c.vectors("a_d (h - <h>)", "altitude", along, &[&|g| s.drag_ng[g] * (height[g] - mean_height)]);
-    c.vectors("a_d (t - <t>)", "time", along, &[&|g| s.drag_ng[g] * (s.grid_s[g] - s.grid_s[0])]);
+    c.vectors("a_d (t - <t>)", "time", along, &[&|g| s.drag_ng[g] * (s.grid_s[g] - mean_s)]);
     c.vectors("a_d sin^2(latitude)", "latitude", along, &[&|g| s.drag_ng[g] * latitude[g] * latitude[g]]);
     c.vectors(
         "a_d sin 2LT, a_d cos 2LT",
         "local_time",
         along,
-        &[&|g| s.drag_ng[g] * (2.0 * (ascension[g] - sun_ra)).sin(), &|g| {
-            s.drag_ng[g] * (2.0 * (ascension[g] - sun_ra)).cos()
-        }],
+        &[&|g| s.drag_ng[g] * (2.0 * local[g]).sin(), &|g| s.drag_ng[g] * (2.0 * local[g]).cos()],
     );
     for delay_s in [600.0, 1800.0] {
         let before = |g: usize| s.grid_s.partition_point(|t| *t < s.grid_s[g] - delay_s);

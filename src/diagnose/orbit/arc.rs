@@ -327,7 +327,7 @@ impl ArcFit {
     }
 }
 
-/// Least squares by Cholesky on normalised columns; none if the columns are dependent.
+/// Least squares by QR on normalised columns; none if one is nothing beside those before it.
 pub(super) fn solve(design: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
     let norms: Vec<f64> = design.column_iter().map(|c| c.norm().max(1e-300)).collect();
     let mut scaled = design.clone();

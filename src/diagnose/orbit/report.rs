@@ -6,7 +6,7 @@ use super::arc::{Arc, ArcFit};
 use super::forces::Term;
 use super::held_out::missed_m;
 use super::manoeuvre::Manoeuvre;
-use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m};
+use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m, projected_rms_m};
 use crate::diagnose::answer::{Alternative, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, StepAnswer, in_order, parameter, posterior,
@@ -312,13 +312,10 @@ fn limits(problem: &Problem, search: &Search, last: &Level) -> Vec<Limit> {
                 return None;
             }
             if term.is_known_size() {
-                // The term's size is known: the limit is what it would do to the orbit.
-                let fit = &last.fits[i];
-                let column = fit.columns.iter().position(|(t, _)| t == term)?;
-                let n = 3 * problem.arcs[i].fitted;
-                return Some(
-                    fit.partials.view((0, 6 + column), (n, 1)).norm() / (problem.arcs[i].fitted as f64).sqrt(),
-                );
+                // The term's size is known: the limit is what the most of it would do that the state does not take.
+                let whole_m = projected_rms_m(&problem.arcs[i], &last.fits[i], *term);
+                let Estimate { value, sigma } = estimates[0];
+                return Some(whole_m * (value.abs() + 2.0 * sigma));
             }
             // Of a cosine and a sine, the amplitude.
             let value: f64 = estimates.iter().map(|e| e.value.powi(2)).sum();

@@ -266,6 +266,12 @@ fn rows_of(arc: &Arc, fit: &ArcFit, keep: impl Fn(Term) -> bool, wanted: Term) -
     Projected { residual, columns, unknowns: base.len() }
 }
 
+/// What the whole of a term would leave in an arc beside what is fitted, rms, m.
+pub(super) fn projected_rms_m(arc: &Arc, fit: &ArcFit, term: Term) -> f64 {
+    let columns = rows_of(arc, fit, |_| true, term).columns;
+    (columns.column_sum().norm_squared() / arc.fitted as f64).sqrt()
+}
+
 /// Observed minus computed of the fitted epochs, one column.
 pub(super) fn residual(arc: &Arc, fit: &ArcFit) -> DVector<f64> {
     DVector::from_iterator(3 * arc.fitted, fit.residuals_m[..arc.fitted].iter().flat_map(|r| [r.x, r.y, r.z]))

@@ -369,7 +369,7 @@ fn unit(case: &MeasuredCase) -> String {
     }
 }
 
-fn effect(case: &MeasuredCase, fit: &Triad, part: Part, score: f64, was: f64) -> Effect {
+fn effect(case: &MeasuredCase, fit: &Triad, part: Part, score: f64, [was, is]: [f64; 2]) -> Effect {
     let values = fit.values(part);
     let unit = if part == Part::Bias { unit(case) } else { part.unit().to_owned() };
     let mut parameters: Vec<ParameterAnswer> =
@@ -384,7 +384,7 @@ fn effect(case: &MeasuredCase, fit: &Triad, part: Part, score: f64, was: f64) ->
         }
         Part::NonOrthogonality => " A rigid rotation of the triad cannot show in a magnitude.".to_owned(),
     };
-    let why = format!("With it |a| - g falls from {was:.5} to {:.5} m/s^2 rms.{extra}", fit.rms());
+    let why = format!("With it |a| - g falls from {was:.5} to {is:.5} m/s^2 rms.{extra}");
     let axis = (part == Part::Scale).then(|| ["x", "y", "z"][largest].to_owned());
     if part == Part::Scale {
         // The three add to nothing: what the axis has beyond the mean of the others is half as much again.
@@ -406,8 +406,9 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
     };
     let mut effects = Vec::new();
     for (i, (part, score)) in found.added.iter().enumerate() {
-        let mut one = effect(case, last, *part, *score, found.fits[i].rms());
-        one.rms = vec![found.fits[i].rms_from(&found.fits[i + 1])];
+        let (before, with) = (&found.fits[i], &found.fits[i + 1]);
+        let mut one = effect(case, last, *part, *score, [before.rms(), with.rms()]);
+        one.rms = vec![before.rms_from(with)];
         effects.push(one);
     }
     let effects = in_order(effects);

@@ -99,29 +99,31 @@ fn equal(points: usize) -> Vec<f64> {
 fn log_shares(scene: &Scene, effect: &Effect, points: &[(Theta, Shape)]) -> Vec<f64> {
     match effect.nonlinear {
         [parameter] if parameter.step > 0.0 && points.len() > 1 => {
-            let values: Vec<f64> = points.iter().map(|(theta, _)| theta[0]).collect();
-            log_shares_along(parameter, |x| (effect.log_density)(scene, &[x, 0.0]), &values)
+            let places: Vec<Theta> = points.iter().map(|(theta, _)| *theta).collect();
+            log_shares_along(parameter, |x| (effect.log_density)(scene, &[x, 0.0]), &places)
         }
         _ => equal(points.len()),
     }
 }
 
-/// Of points along one parameter, each with the stretch half way to those beside it; one that has half of the prior to itself has that.
-fn log_shares_along(parameter: &Nonlinear, log_density: impl Fn(f64) -> f64, points: &[f64]) -> Vec<f64> {
-    let mut sorted = points.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.dedup();
+/// Of points along one parameter, each with the stretch half way to those of its way (the second number) beside it; one that has half of the
+/// prior to itself has that.
+fn log_shares_along(parameter: &Nonlinear, log_density: impl Fn(f64) -> f64, points: &[Theta]) -> Vec<f64> {
     let is_atom = |x: f64| parameter.atom == Some(x);
-    let mass = |x: &f64| {
+    let mass = |[x, way]: &Theta| {
+        // The atom is where every way begins.
+        let mut sorted: Vec<f64> =
+            points.iter().filter(|[y, other]| other == way || is_atom(*y)).map(|[y, _]| *y).collect();
+        sorted.sort_by(f64::total_cmp);
         let i = sorted.partition_point(|y| y < x);
         let [before, after] = [i.saturating_sub(1), (i + 1).min(sorted.len() - 1)];
         let stretch = (sorted[after] - sorted[before]) / (after - before) as f64;
         if is_atom(*x) { 0.0 } else { log_density(*x).exp() * stretch }
     };
     let masses: Vec<f64> = points.iter().map(mass).collect();
-    let has_atom = points.iter().any(|x| is_atom(*x));
+    let has_atom = points.iter().any(|[x, _]| is_atom(*x));
     let whole = masses.iter().sum::<f64>() * if has_atom { 2.0 } else { 1.0 };
-    points.iter().zip(masses).map(|(x, mass)| if is_atom(*x) { 0.5_f64 } else { mass / whole }.ln()).collect()
+    points.iter().zip(masses).map(|([x, _], mass)| if is_atom(*x) { 0.5_f64 } else { mass / whole }.ln()).collect()
 }
 
 #[cfg(test)]
@@ -131,7 +133,8 @@ mod tests {
 
     fn shares(id: &str, log_density: impl Fn(f64) -> f64, points: &[f64]) -> Vec<f64> {
         let parameter = &by_id(id).unwrap().nonlinear[0];
-        let shares: Vec<f64> = log_shares_along(parameter, log_density, points).iter().map(|s| s.exp()).collect();
+        let points: Vec<Theta> = points.iter().map(|x| [*x, 0.0]).collect();
+        let shares: Vec<f64> = log_shares_along(parameter, log_density, &points).iter().map(|s| s.exp()).collect();
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{shares:?}");
         shares
     }

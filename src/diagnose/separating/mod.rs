@@ -344,6 +344,7 @@ fn to_come(scene: &Scene, action: Action, hours: f64) -> Option<(Case, Surroundi
         Case {
             expected: Arc::new(expected),
             recording,
+            windows_beyond: 0,
             windows_in_holes: 0,
             windows_too_rough: 0,
             windows_of_spikes: 0,

@@ -303,16 +303,20 @@ impl Row<'_> {
 }
 
 fn located(measured: &[&Row<'_>]) -> Located {
+    let found = |row: &Row<'_>| {
+        let form = row.found.form.as_ref().map(|(form, score, _)| (*form, *score));
+        row.found.effects.iter().copied().chain(form).collect::<Vec<(Follows, f64)>>()
+    };
     let covariates = measured.iter().flat_map(|row| {
-        let follows = |f: &Follows| match f {
-            Follows::Temperature(k, _) | Follows::Delayed(k, _) => row.series.covariates[*k].name.clone(),
+        let follows = |f: Follows| match f {
+            Follows::Temperature(k, _) | Follows::Delayed(k, _) | Follows::Form(_, k, _) => {
+                row.series.covariates[k].name.clone()
+            }
             other => other.id().to_owned(),
         };
-        let one = move |(f, score): &(Follows, f64)| Covariate {
-            name: format!("{}: {}", row.axis.column, follows(f)),
-            score: *score,
-        };
-        row.found.effects.iter().map(one).collect::<Vec<_>>()
+        let one =
+            |(f, score): (Follows, f64)| Covariate { name: format!("{}: {}", row.axis.column, follows(f)), score };
+        found(row).into_iter().map(one).collect::<Vec<_>>()
     });
     let onset = |row: &&&Row<'_>| {
         let at = row.found.effects.iter().find_map(|(f, _)| if let Follows::Step(s) = f { Some(*s) } else { None })?;
@@ -320,7 +324,7 @@ fn located(measured: &[&Row<'_>]) -> Located {
         Some(Interval { start_s: at, end_s, why: format!("{}: onset", row.axis.column) })
     };
     Located {
-        axes: measured.iter().filter(|row| !row.found.effects.is_empty()).map(|row| row.axis.name.clone()).collect(),
+        axes: measured.iter().filter(|row| !found(row).is_empty()).map(|row| row.axis.name.clone()).collect(),
         frame: "sensor".to_owned(),
         covariates: covariates.collect(),
         intervals: measured.iter().filter_map(|row| onset(&row)).collect(),

@@ -8,14 +8,12 @@ use crate::diagnose::solve::Library;
 /// Log odds (of twenty) within which another set is as good, and the smaller of two nested sets is preferred.
 pub const EQUAL: f64 = 3.0;
 
-/// Listed sets whose sizes can be believed; the others are refused, with the reason.
-pub fn credible<'a>(
-    scene: &Scene,
-    library: &Library,
-    sets: &'a [Weighed],
-    notes: &mut Vec<String>,
-) -> Vec<&'a Weighed> {
-    let mut kept = Vec::new();
+/// So many reasons of refusals are told.
+const REFUSALS_TOLD: usize = 3;
+
+/// Listed sets whose sizes can be believed, and why others are refused.
+pub fn credible<'a>(scene: &Scene, library: &Library, sets: &'a [Weighed]) -> (Vec<&'a Weighed>, Vec<String>) {
+    let (mut kept, mut refusals) = (Vec::new(), Vec::new());
     for w in sets {
         let (frame, set) = w.framed(scene, &library.entries);
         let (mean, covariance) = set.coefficients(&frame, &library.entries);
@@ -33,11 +31,11 @@ pub fn credible<'a>(
         }
         match reason {
             None => kept.push(w),
-            Some(reason) if !notes.contains(&reason) && notes.len() < 3 => notes.push(reason),
+            Some(reason) if !refusals.contains(&reason) && refusals.len() < REFUSALS_TOLD => refusals.push(reason),
             Some(_) => {}
         }
     }
-    kept
+    (kept, refusals)
 }
 
 /// The smallest set that is part of the best one and as good.

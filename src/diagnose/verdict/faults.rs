@@ -45,6 +45,8 @@ pub fn tell(answer: &mut Diagnosis, scene: &Scene) {
             answer.false_alarm_from = Some(Source::Calibration);
         }
         if answer.verdict == Verdict::Consistent {
+            // What came nearest to a claim beside noise is no other explanation of the fault.
+            answer.alternatives.clear();
             answer.verdict = Verdict::Explained;
         }
     }

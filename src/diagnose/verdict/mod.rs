@@ -23,7 +23,7 @@ use self::named::name;
 use self::nearest::nearest;
 use self::proportion::of_proportion;
 use self::stands::tried;
-use self::unnamed::{hypothesis, of_failure, of_remains};
+use self::unnamed::{hypothesis, near_fail, of_failure, of_remains};
 use super::answer::{Diagnosis, LEAST_PROBABILITY, Located, Source, Verdict};
 use super::bursts::OUT;
 use super::case::{Event, KINDS_TRIED, SPIKE};
@@ -129,10 +129,13 @@ fn of_the_mismatch(
     notes.extend(of_proportion(scene));
     notes.extend(of_resonances(&solution.null));
     notes.extend(of_colour(solution.statistic() - proof.statistic));
-    let listed = credible(scene, library, &solution.listed, &mut notes);
+    let (listed, refusals) = credible(scene, library, &solution.listed);
+    notes.extend(refusals);
     let judged = judge(scene, library, solution, &listed, proof);
     let Judged { open_wins, failure, .. } = judged;
-    notes.extend(failure.clone());
+    if judged.verdict != Verdict::Unexplained {
+        notes.extend(failure.clone());
+    }
     let chosen = judged.on_trial.as_ref().map(|(weighed, _)| *weighed);
     let (verdict, least, remains) = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
     let tried = judged.on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
@@ -183,14 +186,19 @@ fn of_the_mismatch(
     answer.upper_limits = upper_limits(library, &best.frame, &best.set);
     match verdict {
         Verdict::Unexplained => {
-            answer.hypothesis = Some(match (failure, remains) {
-                (Some(failure), _) => of_failure(&ids(library, &best.set).join(" + "), &failure),
+            let best_ids = ids(library, &best.set).join(" + ");
+            match (failure, remains) {
+                (Some(failure), _) => notes.push(of_failure(&best_ids, &failure)),
                 (None, Some(r)) => {
                     answer.located = of_what_remains(scene, &best.frame, &r, answer.located);
-                    of_remains(&r, &format!(" It remains beside {}.", ids(library, &best.set).join(" + ")))
+                    answer.hypothesis = Some(of_remains(&r, &format!(" It remains beside {best_ids}.")));
                 }
-                (None, None) => hypothesis(library, &best, &listed, open_wins),
-            });
+                (None, None) if open_wins => answer.hypothesis = Some(hypothesis(library, &best, &listed)),
+                (None, None) => {
+                    let near = near_fail(library, &best, &listed);
+                    notes.push(format!("No set of listed effects can be believed. {near}").trim_end().into());
+                }
+            }
         }
         _ => {
             notes.extend(of_assumptions(scene, library, &best.set));
@@ -217,6 +225,13 @@ fn of_windows(scene: &Scene) -> Vec<String> {
     let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
     let in_holes = scene.case.windows_in_holes;
     let mut notes = Vec::new();
+    notes.extend(scene.case.recording.notes.iter().cloned());
+    let beyond = scene.case.windows_beyond;
+    if beyond > 0 {
+        notes.push(format!(
+            "{beyond} windows of the span are not compared: they are before or after what simulation and ancillary data have"
+        ));
+    }
     if in_holes > 0 {
         notes.push(format!("{in_holes} windows are left out: simulation or ancillary data have a hole there"));
     }

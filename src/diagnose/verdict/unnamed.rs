@@ -20,18 +20,13 @@ pub fn of_remains(r: &Remains, beside: &str) -> Hypothesis {
     }
 }
 
-/// From a set whose evidence is beyond doubt, and which failed its trial: something is there, and it is not this.
-pub fn of_failure(set: &str, failure: &str) -> Hypothesis {
-    Hypothesis {
-        formula: "none".into(),
-        axis: "x, y, z".into(),
-        unit: "ng".into(),
-        location: format!("Where {set} would act, which comes nearest; but {failure}."),
-    }
+/// Of a set whose evidence is beyond doubt, and which failed its trial: something is there, and it is not this.
+pub fn of_failure(set: &str, failure: &str) -> String {
+    format!("It is where {set} would act, which comes nearest; but {failure}.")
 }
 
-/// From the open forms that won, or from nothing where none did, with the listed sets that came near.
-pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins: bool) -> Hypothesis {
+/// By how much the listed sets that came near are less likely than the best of all.
+pub fn near_fail(library: &Library, best: &Best, listed: &[&Weighed]) -> String {
     let near = |w: &&Weighed| {
         format!(
             "{} lacks {:.1} in log evidence",
@@ -39,15 +34,12 @@ pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed], open_wins
             best.weighed.log_posterior - w.log_posterior
         )
     };
-    let fails = listed.iter().take(3).map(near).collect::<Vec<_>>().join("; ");
-    if !open_wins {
-        return Hypothesis {
-            formula: "none".into(),
-            axis: "x, y, z".into(),
-            unit: "ng".into(),
-            location: format!("No credible set of listed effects. {fails}"),
-        };
-    }
+    listed.iter().take(3).map(near).collect::<Vec<_>>().join("; ")
+}
+
+/// From the open forms that won, with the listed sets that came near.
+pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed]) -> Hypothesis {
+    let fails = near_fail(library, best, listed);
     let mut formula = Vec::new();
     let mut axis = Vec::new();
     let mut location = Vec::new();
