@@ -1,7 +1,7 @@
 //! Bias follows the sensor temperature, perhaps late: by a delay, or as what is warmed through a resistance, with a time constant.
 //!
-//! What a delayed one follows before the log of the temperature begins is one of two, as likely: what the log begins with, or the cycles
-//! of the orbit and the day. One with a time constant has followed those cycles.
+//! What it followed before the log of the temperature begins is one of two, as likely: what the log begins with, or the cycles of the
+//! orbit and the day.
 
 use std::borrow::Cow;
 
@@ -45,10 +45,11 @@ pub const EFFECT: Effect = Effect {
 /// Longest lag, s.
 const LAG_S_MAX: f64 = REACH_S;
 
-/// The second number of a theta. A delay, and before the log there was what it begins with, or what its cycles tell; or a time constant.
+/// The second number of a theta: a delay or a time constant, and before the log there was what it begins with, or what its cycles tell.
 const AS_IT_BEGINS: f64 = 0.0;
 const AS_ITS_CYCLES: f64 = 1.0;
-const RELAXING: f64 = 2.0;
+const RELAXING_AS_IT_BEGINS: f64 = 2.0;
+const RELAXING_AS_ITS_CYCLES: f64 = 3.0;
 
 /// Time constants tried first, s.
 const TAUS_S: [f64; 12] =
@@ -64,34 +65,43 @@ fn grid(scene: &Scene) -> Vec<Theta> {
     let lags = || [0.0, 300.0, 600.0].into_iter().chain((1..=32).map(|k| 900.0 * f64::from(k)));
     let beyond = lags().filter(|lag| *lag > logged(scene));
     let delayed = lags().map(|lag| [lag, AS_IT_BEGINS]).chain(beyond.map(|lag| [lag, AS_ITS_CYCLES]));
-    delayed.chain(TAUS_S.map(|tau| [tau, RELAXING])).collect()
+    let relaxing =
+        [RELAXING_AS_IT_BEGINS, RELAXING_AS_ITS_CYCLES].into_iter().flat_map(|way| TAUS_S.map(|tau| [tau, way]));
+    delayed.chain(relaxing).collect()
 }
 
 fn log_density(scene: &Scene, theta: &Theta) -> f64 {
-    let ways: f64 = if theta[0] > logged(scene) { 3.0 } else { 2.0 };
+    let ways: f64 = if theta[0] > logged(scene) { 4.0 } else { 3.0 };
     -(ways * LAG_S_MAX).ln()
+}
+
+fn is_relaxing(way: f64) -> bool {
+    way >= RELAXING_AS_IT_BEGINS
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     if !(0.0..=LAG_S_MAX).contains(&theta[0]) {
         return None;
     }
+    let [lag_s, way] = *theta;
     let longer = &scene.temperature_and_earlier;
-    let (grid_s, temperature_c, delay_s) = match theta[1] {
-        RELAXING => (&longer.grid_s, Cow::Owned(relaxing(&longer.grid_s, &longer.values, theta[0])), 0.0),
-        AS_ITS_CYCLES => (&longer.grid_s, Cow::Borrowed(&longer.values), theta[0]),
-        _ => (&scene.grid_s, Cow::Borrowed(&scene.temperature_c), theta[0]),
+    let (grid_s, temperature_c) = match way {
+        AS_IT_BEGINS | RELAXING_AS_IT_BEGINS => (&scene.grid_s, &scene.temperature_c),
+        _ => (&longer.grid_s, &longer.values),
+    };
+    let (followed_c, delay_s) = match is_relaxing(way) {
+        true => (Cow::Owned(relaxing(grid_s, temperature_c, lag_s)), 0.0),
+        false => (Cow::Borrowed(temperature_c), lag_s),
     };
     // About its mean: a constant is nuisance, and where the mismatch is largest must not hang on the zero of the scale.
     let mean_c = scene.temperature_c.iter().sum::<f64>() / scene.temperature_c.len() as f64;
-    let about_mean = |clock_s: &[f64]| {
-        window_means(grid_s, &temperature_c, clock_s, delay_s).into_iter().map(|t| t - mean_c).collect()
-    };
+    let about_mean =
+        |clock_s: &[f64]| window_means(grid_s, &followed_c, clock_s, delay_s).into_iter().map(|t| t - mean_c).collect();
     Some(in_sensor(scene, about_mean))
 }
 
 fn assumes(scene: &Scene, theta: &Theta) -> Option<String> {
-    if theta[1] == RELAXING {
+    if is_relaxing(theta[1]) {
         return Some(format!(
             "the lag of {:.0} s is a time constant with which the temperature is followed, and no delay",
             theta[0]
@@ -134,12 +144,12 @@ mod tests {
             let size = (1.0 + (w * tau_s).powi(2)).sqrt().recip();
             20.0 + size * (made::temperature_c(t - (w * tau_s).atan() / w) - 20.0)
         };
-        let columns = made::columns(&scene, &EFFECT, [tau_s, RELAXING]);
+        let columns = made::columns(&scene, &EFFECT, [tau_s, RELAXING_AS_IT_BEGINS]);
         for t in [110_000.0, 113_000.0, 116_000.0] {
             let found = made::at(&scene, &columns[1][1], t);
             assert!((found - (relaxed(t) - mean_c)).abs() < 0.02, "{found} at {t}, {} expected", relaxed(t) - mean_c);
         }
-        assert!(assumes(&scene, &[500.0, RELAXING]).is_some_and(|said| said.contains("time constant")));
+        assert!(assumes(&scene, &[500.0, RELAXING_AS_ITS_CYCLES]).is_some_and(|said| said.contains("time constant")));
         assert!(assumes(&scene, &[500.0, AS_IT_BEGINS]).is_none(), "the log begins ten minutes before the record");
         assert!(assumes(&scene, &[2000.0, AS_IT_BEGINS]).is_some_and(|said| said.contains("2000 s late")));
     }
