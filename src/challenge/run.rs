@@ -162,6 +162,29 @@ mod tests {
         }
     }
 
+    /// Answers with what it was told to leave out.
+    struct Telling;
+
+    impl Analyser for Telling {
+        fn answer(&self, _: &Material, without: Option<&str>) -> Result<serde_json::Value, String> {
+            Ok(serde_json::json!({ "verdict": without.unwrap_or("nothing") }))
+        }
+    }
+
+    #[test]
+    fn what_the_truth_of_an_open_case_deletes_is_left_out() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, deleted) in [("a", Some("vent_leak")), ("b", None)] {
+            let truth = Truth { case: name.into(), deleted: deleted.map(str::to_string), ..Truth::default() };
+            std::fs::create_dir(folder.path().join(name)).unwrap();
+            std::fs::write(folder.path().join(name).join("truth.json"), serde_json::to_string(&truth).unwrap())
+                .unwrap();
+        }
+        let outcomes = run_open(folder.path(), &Telling, &ProgressBar::hidden()).unwrap();
+        let told: Vec<String> = outcomes.into_iter().map(|outcome| outcome.answer.unwrap().verdict).collect();
+        assert_eq!(told, ["vent_leak", "nothing"]);
+    }
+
     #[test]
     fn any_beginning_of_a_plan_has_its_shares() {
         let orders = plan(100, 1, &Kind::ALL, Manner::default(), None);

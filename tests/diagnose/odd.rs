@@ -129,6 +129,35 @@ fn what_nothing_can_be_is_refused_with_its_place() {
             }),
             "case.toml: `case.end_s` (10 s) must be after `case.start_s` (",
         ),
+        (
+            with_lines("events.csv", |lines| lines.push("400000,-80,crew_sleep,".into())),
+            ": `duration_s` is -8.000e1, and s between 0e0 and 3e9 is expected",
+        ),
+        (
+            with_lines("simulation.csv", |lines| lines.iter_mut().for_each(|line| *line += ",0"))
+                .into_iter()
+                .map(|(name, octets)| match name.as_str() {
+                    "simulation.csv" => (
+                        name,
+                        [
+                            b"clock_s,ax_ng,ay_ng,az_ng,ax_ng\n",
+                            &octets[octets.iter().position(|o| *o == b'\n').unwrap() + 1..],
+                        ]
+                        .concat(),
+                    ),
+                    _ => (name, octets),
+                })
+                .collect(),
+            "simulation.csv: the header has the column `ax_ng` 2 times",
+        ),
+        (
+            with_lines("simulation.csv", |lines| lines[7] += ",1"),
+            "simulation.csv: line 8: 5 cells, and the header has 4",
+        ),
+        (
+            with_lines("simulation.csv", |lines| lines.iter_mut().for_each(|line| *line = line.replace(',', ";"))),
+            "(commas are expected between the cells)",
+        ),
         (with_key("mass_kg", "104.0"), "ancillary.csv: `drag by density_kg_m3 and case.toml's mass_kg, area_m2"),
         (
             with_cell("ancillary.csv", None, "density_kg_m3", "2e-14"),
@@ -187,6 +216,7 @@ fn every_length_of_record_has_an_answer_without_absurd_limits() {
     for windows in [205, 210, 250, 320] {
         let short = with_lines("recording.csv", |lines| lines.truncate(windows + 1));
         let found = diagnose(&read(&short).unwrap(), &Settings::default()).unwrap();
+        assert!(!found.upper_limits.is_empty(), "{windows}: {found:?}");
         for limit in &found.upper_limits {
             assert!(limit.limit_ng > 0.0 && limit.limit_ng < 1e5, "{windows}: {limit:?}");
         }
@@ -217,6 +247,8 @@ fn what_cannot_be_read_is_not_missing() {
     std::fs::remove_dir(&simulation).unwrap();
     std::fs::write(&simulation, b"clock_s,ax_ng\n\xff").unwrap();
     assert_eq!(read(), "simulation.csv: it is there and cannot be read: octet 15 is no UTF-8 text");
+    std::fs::write(&simulation, b"\x1f\x8b\x08\x00").unwrap();
+    assert_eq!(read(), "simulation.csv: it is there and cannot be read: it is packed by gzip");
     std::fs::remove_file(folder.path().join("case.toml")).unwrap();
     assert!(read().starts_with("case.toml: there is none in "), "{}", read());
     let file = folder.path().join("events.csv");
@@ -377,4 +409,57 @@ fn a_log_of_very_many_kinds_is_tried_in_part_and_told() {
     }));
     assert!(notes.iter().any(|note| note.contains("kinds of entries: formulas are made of the 32")), "{notes:?}");
     assert!((beside - value).abs() < 0.5 * sigma, "{beside} for {value}");
+}
+
+/// A simulation that ends before the recording does is compared as far as it goes, and that is told.
+#[test]
+fn windows_that_nothing_is_simulated_for_are_told() {
+    let half = with_lines("simulation.csv", |lines| lines.truncate(lines.len() / 2));
+    let case = read(&half).unwrap();
+    assert!(case.windows_beyond > 1000 && case.recording.clock_s.len() > 1000, "{}", case.windows_beyond);
+    let told = format!("{} windows of the span are not compared: ", case.windows_beyond);
+    let found = diagnose(&case, &Settings::default()).unwrap();
+    assert!(found.notes.iter().any(|note| note.starts_with(&told)), "{:?}", found.notes);
+}
+
+/// An entry that is in the log twice, as from two shifts, is one night.
+#[test]
+fn sleep_that_is_logged_twice_is_no_more_sleep() {
+    let twice = with_lines("events.csv", |lines| {
+        let sleep: Vec<String> = lines.iter().filter(|line| line.contains("crew_sleep")).cloned().collect();
+        assert!(!sleep.is_empty());
+        lines.extend(sleep);
+    });
+    let [once, twice] = [files(), twice].map(|files| drag(&files));
+    assert_eq!(once, twice);
+}
+
+/// Where the mismatch is does not hang on where a thermometer has its zero.
+#[test]
+fn kelvin_or_celsius_the_answer_is_the_same() {
+    let order = Order { kind: Kind::One, seed: 1_170_013, only: Some("temperature_bias"), manner: Manner::default() };
+    let celsius = draw_order(&order).files;
+    let mut warmer = celsius.clone();
+    let (_, octets) = warmer.iter_mut().find(|(name, _)| name == "ancillary.csv").unwrap();
+    let text = String::from_utf8(octets.clone()).unwrap();
+    let place = text.lines().next().unwrap().split(',').position(|name| name == "temperature_c").unwrap();
+    let line = |(i, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_string).collect();
+        if i > 0 {
+            cells[place] = (cells[place].parse::<f64>().unwrap() + 20.0).to_string();
+        }
+        cells.join(",") + "\n"
+    };
+    *octets = text.lines().enumerate().map(line).collect::<String>().into_bytes();
+    let [a, b] = [celsius, warmer].map(|files| diagnose(&read(&files).unwrap(), &Settings::default()).unwrap());
+    assert_eq!((a.located.axes, a.located.frame), (b.located.axes, b.located.frame));
+    assert_eq!(
+        a.located.intervals.len(),
+        b.located.intervals.len(),
+        "{:?} {:?}",
+        a.located.intervals,
+        b.located.intervals
+    );
+    let covered: f64 = a.located.intervals.iter().map(|i| i.end_s - i.start_s).sum();
+    assert!(covered < 0.9 * 36.0 * 3600.0, "the largest part of the mismatch is no whole record: {covered} s");
 }

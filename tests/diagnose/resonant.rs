@@ -16,14 +16,12 @@ fn drawn(kind: Kind, seed: u64, wander: Wander) -> Concealed {
 /// Noise that resonates is noise, and told as such.
 #[test]
 fn noise_that_resonates_is_no_finding_and_is_told() {
-    let mut told = 0;
     for seed in SEEDS {
         let concealed = drawn(Kind::Slow, seed, Wander::Resonant);
         let answer = diagnose(&super::case(&concealed.files), &Settings::default()).unwrap();
         assert_eq!(answer.verdict, Verdict::Consistent, "{seed}: {:?} {:?}", super::ids(&answer), answer.hypothesis);
-        told += answer.notes.iter().filter(|note| note.contains("is taken to resonate")).count();
+        assert!(answer.notes.iter().any(|note| note.contains("is taken to resonate")), "{seed}: {:?}", answer.notes);
     }
-    assert!(told >= SEEDS.len(), "{told}");
 }
 
 /// An oscillation that keeps its phase is a finding, a tenth of the noise as it is; so it stays when the noise resonates elsewhere.

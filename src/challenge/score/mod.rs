@@ -230,6 +230,28 @@ mod tests {
     }
 
     #[test]
+    fn a_case_without_an_answer_is_a_miss_and_no_alarm() {
+        let silent = r#"{"verdict":"consistent"}"#;
+        let mut failed = [
+            outcome("clean", None, 0.0, silent),
+            outcome("one", Some("vent_leak"), 30.0, silent),
+            outcome("unknown", None, 30.0, silent),
+        ];
+        failed.iter_mut().for_each(|outcome| outcome.answer = Err("it panicked".into()));
+        let score = score(&failed);
+        assert_eq!(score.failed.len(), 3);
+        for name in [
+            "false alarm, clean",
+            "right first name, SNR 12 and more",
+            "truth inside the reported set, SNR 8 and more",
+            "unlisted law: flagged unexplained",
+            "unlisted law: given a physical name",
+        ] {
+            assert_eq!(value(&score, name), (0, 1), "{name}");
+        }
+    }
+
+    #[test]
     fn a_named_effect_counts_by_its_set_and_its_numbers() {
         let answer = r#"{"verdict":"explained","effects":[{"id":"aerodynamic_drag","parameters":
             [{"name":"fraction","value":0.25,"sigma":0.02,"unit":"1"}]}],"alternatives":[{"effects":["scale_factor"]}]}"#;

@@ -126,6 +126,8 @@ fn what_a_triad_of_another_kind_lacks_is_found_with_errors_that_hold() {
         named += usize::from(ids == ["bias", "non_orthogonality", "scale_factor"]);
         assert!(answer.fit.after.rms_total < 0.002, "{}", answer.fit.after.rms_total);
         for effect in &answer.effects {
+            let with = answer.steps.iter().find(|step| step.added.as_ref() == Some(&effect.id)).unwrap();
+            assert!(effect.why.contains(&format!("to {:.5} m/s^2", with.rms)), "{}: {with:?}", effect.why);
             let true_values = match effect.id.as_str() {
                 "bias" => truth.bias,
                 "scale_factor" => truth.scale,
