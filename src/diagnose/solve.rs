@@ -115,12 +115,6 @@ impl Solution {
         let paid = (0.5 * energy - best.set.score).max(0.0);
         statistic - (1.0 - remains::loudness_under(&left, &scene.schedule, &signal).recip()) * (statistic + paid)
     }
-
-    /// Log posterior odds of the best open hypothesis against the best listed one (or nothing, if that is better).
-    pub fn open_advantage(&self) -> f64 {
-        let top = |sets: &[Weighed]| sets.first().map_or(f64::NEG_INFINITY, |w| w.log_posterior);
-        top(&self.open) - top(&self.listed).max(self.null.log_posterior)
-    }
 }
 
 /// The noise when nothing is left out; `start` is a first guess, when one is at hand.

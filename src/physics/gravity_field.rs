@@ -73,11 +73,6 @@ impl GravityField {
         Ok(Self::up_to(degree, &model))
     }
 
-    /// From fully normalised coefficients.
-    pub fn from_coefficients(normalised: &Coefficients) -> Self {
-        Self::up_to(normalised.max_degree(), normalised)
-    }
-
     fn up_to(degree: usize, normalised: &Coefficients) -> Self {
         let degree = degree.min(DEGREE_MAX);
         let (mut c, mut s) = (vec![0.0; index(degree, degree) + 1], vec![0.0; index(degree, degree) + 1]);

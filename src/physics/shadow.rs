@@ -31,15 +31,15 @@ pub fn sunlit_fraction(r_m: &Vec3, sun_unit: &Vec3) -> f64 {
     (1.0 - area / (PI * a * a)).clamp(0.0, 1.0)
 }
 
-/// Whether the point lies outside a cylinder of the Earth's radius behind the Earth: no penumbra.
-pub fn is_sunlit_cylinder(r_m: &Vec3, sun_unit: &Vec3) -> bool {
-    let along_m = r_m.dot(sun_unit);
-    along_m >= 0.0 || (r_m - sun_unit * along_m).norm() >= EARTH_RADIUS_M
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Whether the point lies outside a cylinder of the Earth's radius behind the Earth: no penumbra.
+    fn is_sunlit_cylinder(r_m: &Vec3, sun_unit: &Vec3) -> bool {
+        let along_m = r_m.dot(sun_unit);
+        along_m >= 0.0 || (r_m - sun_unit * along_m).norm() >= EARTH_RADIUS_M
+    }
 
     const RADIUS_M: f64 = EARTH_RADIUS_M + 300e3;
 

@@ -74,14 +74,6 @@ impl Instrument {
     pub fn resolution_ng(&self, axis: Axis, range: Range) -> f64 {
         self.resolution_ng[axis.index()][range.index()]
     }
-
-    /// What the instrument reports for a count, in nominal ng: at the rail 1.5 times the full scale of range A.
-    pub fn nominal_ng(&self, axis: Axis, range: Range, counts: i16) -> f64 {
-        if crate::telemetry::AccRecord::is_at_rail(counts) {
-            return 1.5 * self.full_scale_a_ng[axis.index()] * f64::from(counts.signum());
-        }
-        f64::from(counts) * self.resolution_ng(axis, range)
-    }
 }
 
 /// How a window is estimated.

@@ -109,7 +109,7 @@ impl Noise {
                     return Step { h, gain: [0.0; 4], sigma: f64::INFINITY };
                 }
                 let ph: [f64; 4] = std::array::from_fn(|i| (0..4).map(|j| p[i][j] * h[j]).sum());
-                // A thousandth of the level squared keeps the filter well-posed where the halves' sum is known exactly.
+                // A hundredth of the level, squared, keeps the filter well-posed where the halves' sum is known exactly.
                 let variance = (0..4).map(|i| h[i] * ph[i]).sum::<f64>() + 1e-4 * level * level;
                 let gain = ph.map(|x| x / variance);
                 for (i, row) in p.iter_mut().enumerate() {

@@ -62,11 +62,6 @@ impl Truth {
     pub fn is_identifiable(&self) -> bool {
         self.confusable.is_empty()
     }
-
-    /// A law that no catalogue lists, or one deleted from it.
-    pub fn is_unlisted(&self) -> bool {
-        self.kind == "unknown" || self.deleted.is_some()
-    }
 }
 
 #[cfg(test)]

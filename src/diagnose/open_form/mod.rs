@@ -1,6 +1,6 @@
 //! The unlisted competitor: formulas of covariates, events and memory that no catalogue entry claims.
 //!
-//! A dictionary of several hundred forms on the same evidence scale as the catalogue. Every form is dimensionless: centred and
+//! A dictionary of some two hundred forms, families of variants among them, on the same evidence scale as the catalogue. Every form is dimensionless: centred and
 //! scaled to unit deviation over the record, so its coefficient is in ng. A form that wins is a hypothesis with a
 //! formula and a place, never a physical name.
 

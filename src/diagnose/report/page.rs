@@ -234,7 +234,7 @@ fn competition(page: &mut String, d: &Diagnosis) {
     }
     if let Some(s) = &d.separating_observation {
         let (kind, text) = (escaped(&words(&s.kind)), escaped(&s.text));
-        let _ = writeln!(page, "<p>The cheapest observation that tells most of them apart ({kind}): {text}</p>");
+        let _ = writeln!(page, "<p>What to observe next ({kind}): {text}</p>");
     }
     if !d.alternatives.is_empty() {
         let rows = d.alternatives.iter().map(|a| vec![joined(&a.effects), short(a.posterior), short(a.delta_bic)]);

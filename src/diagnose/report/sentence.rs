@@ -80,7 +80,7 @@ fn unexplained(d: &Diagnosis) -> String {
     )
 }
 
-/// A number with two significant digits, no exponent.
+/// A number in three digits or all before the point, and in thousandths at most.
 pub fn short(x: f64) -> String {
     match x.abs() {
         a if a >= 100.0 => format!("{x:.0}"),
