@@ -2,6 +2,7 @@
 //!
 //! `SHA-256(nonce || truth as compact JSON)`. The nonce keeps the truth from being guessed out of the hash.
 
+use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::conceal::Truth;
@@ -58,13 +59,14 @@ pub fn root(seals: &[Seal]) -> String {
     hex(&hasher.finalize())
 }
 
-fn hash(truth: &Truth, nonce: &str) -> String {
+/// SHA-256 of nonce and truth as compact JSON.
+pub(super) fn hash(truth: &impl Serialize, nonce: &str) -> String {
     // A truth is maps of numbers and words: it always serialises.
     let text = serde_json::to_string(truth).unwrap_or_default();
     hex(&Sha256::new().chain_update(nonce).chain_update(text).finalize())
 }
 
-fn hex(bytes: &[u8]) -> String {
+pub(super) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 

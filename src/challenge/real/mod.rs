@@ -18,6 +18,7 @@ use sha2::{Digest, Sha256};
 
 pub use subject::Subject;
 
+use super::seal::{hash, hex};
 use crate::diagnose::answer::ParameterAnswer;
 use crate::diagnose::measured::{Kind, MeasuredCase, MeasuredError};
 use crate::ingest::wire::{Pad, PadError};
@@ -232,12 +233,6 @@ fn outcome(truth: &Truth, nonce: &str, said: Said) -> Outcome {
     }
 }
 
-/// SHA-256 of nonce and truth as compact JSON.
-pub fn hash(truth: &Truth, nonce: &str) -> String {
-    let text = serde_json::to_string(truth).unwrap_or_default();
-    hex(&Sha256::new().chain_update(nonce).chain_update(text).finalize())
-}
-
 /// One hash over all commitments: what a run announces before it analyses.
 pub fn commitment(lots: &[(usize, Truth, String)]) -> String {
     let mut hasher = Sha256::new();
@@ -245,10 +240,6 @@ pub fn commitment(lots: &[(usize, Truth, String)]) -> String {
         hasher.update(hash(truth, nonce).as_bytes());
     }
     hex(&hasher.finalize())
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// Count.

@@ -60,6 +60,9 @@ fn logged(scene: &Scene) -> f64 {
     scene.clock_s()[0] - scene.grid_s[0] - HALF_WINDOW_S
 }
 
+/// A temperature that is off its mean by no more than this part of it does not change.
+const ROUNDING: f64 = 1e-9;
+
 fn grid(scene: &Scene) -> Vec<Theta> {
     // The cycle of the orbit has a peak of the likelihood at every one of its periods: six to each.
     let lags = || [0.0, 300.0, 600.0].into_iter().chain((1..=32).map(|k| 900.0 * f64::from(k)));
@@ -80,7 +83,9 @@ fn is_relaxing(way: f64) -> bool {
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
-    if !(0.0..=LAG_S_MAX).contains(&theta[0]) {
+    let mean_c = scene.temperature_c.iter().sum::<f64>() / scene.temperature_c.len() as f64;
+    let changes = scene.temperature_c.iter().any(|t| (t - mean_c).abs() > ROUNDING * mean_c.abs());
+    if !changes || !(0.0..=LAG_S_MAX).contains(&theta[0]) {
         return None;
     }
     let [lag_s, way] = *theta;
@@ -94,7 +99,6 @@ fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
         false => (Cow::Borrowed(temperature_c), lag_s),
     };
     // About its mean: a constant is nuisance, and where the mismatch is largest must not hang on the zero of the scale.
-    let mean_c = scene.temperature_c.iter().sum::<f64>() / scene.temperature_c.len() as f64;
     let about_mean =
         |clock_s: &[f64]| window_means(grid_s, &followed_c, clock_s, delay_s).into_iter().map(|t| t - mean_c).collect();
     Some(in_sensor(scene, about_mean))
