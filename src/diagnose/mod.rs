@@ -7,6 +7,7 @@
 
 pub mod analysis;
 pub mod answer;
+pub mod axes;
 pub mod bootstrap;
 pub mod bursts;
 pub mod case;

@@ -4,6 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::axes;
 use super::catalogue::{Effect, Shape};
 use super::design::{Column, Frame, Raw};
 use super::scene::{Axes, Scene};
@@ -297,14 +298,10 @@ fn member_series(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, mov
     let first: usize = set.members[..i].iter().map(|m| m.linear()).sum();
     let m = &moved.members[i];
     let columns = entry_columns(scene, &entries[m.entry], &m.theta)?;
-    let mut sum: Axes = std::array::from_fn(|_| vec![0.0; scene.schedule.len()]);
+    let mut sum = axes::nothing(scene.schedule.len());
     for j in 0..m.linear().max(1) {
         let factor = if m.linear() == 0 { 1.0 } else { mean[first + j] };
-        for (total, series) in sum.iter_mut().zip(&columns[m.axis.unwrap_or(j)]) {
-            if let Some(series) = series {
-                total.iter_mut().zip(series).for_each(|(t, x)| *t += factor * x);
-            }
-        }
+        axes::add_regressor(&mut sum, &columns[m.axis.unwrap_or(j)], factor);
     }
     Some(sum)
 }

@@ -15,8 +15,7 @@ use super::error::CaseError;
 use super::measure::{Measurement, coverage, union};
 use super::noise::{self, Contradicted, Loudness, Schedule};
 
-/// One series per body axis.
-pub type Axes = [Vec<f64>; 3];
+pub use super::axes::Axes;
 
 /// The physics of the orbit on the ancillary grid: all of a scene that no window of the recording changes.
 #[derive(Clone)]

@@ -350,13 +350,7 @@ fn lessen(scene: &Scene, entries: &[Entry], listed: &mut Vec<Weighed>, stop: Sto
 fn merge(sets: &mut Vec<Weighed>, more: Vec<Weighed>) {
     sets.extend(more);
     sets.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
-    let mut keys: Vec<Vec<usize>> = Vec::new();
-    sets.retain(|w| {
-        let key = w.set.key();
-        let new = !keys.contains(&key);
-        keys.push(key);
-        new
-    });
+    search::retain_first(sets, |w| w.set.key());
 }
 
 /// The best so many of sets in order, and for each entry that all of these have the best set behind them that does without: whatever joins

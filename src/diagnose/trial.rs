@@ -9,6 +9,7 @@ use std::ops::Range;
 use nalgebra::DVector;
 
 use super::answer::HeldOut;
+use super::axes::add_regressor;
 use super::design::{Chosen, Column, Frame, Normal, Raw};
 use super::model::entry_columns;
 use super::noise::{AxisNoise, Schedule};
@@ -247,7 +248,7 @@ impl<'a> Trial<'a> {
         let mut sum: Axes = std::array::from_fn(|_| vec![0.0; self.scene.schedule.len()]);
         let mut amplitudes = amplitudes.iter();
         for (raw, size) in &self.series {
-            add(&mut sum, raw, size.map_or(1.0, |size| size * amplitudes.next().unwrap_or(&0.0)));
+            add_regressor(&mut sum, raw, size.map_or(1.0, |size| size * amplitudes.next().unwrap_or(&0.0)));
         }
         sum
     }
@@ -258,14 +259,6 @@ struct OnPart {
     normal: Normal,
     /// Log evidence of its members of fixed amplitude.
     of_fixed: f64,
-}
-
-fn add(sum: &mut Axes, raw: &Raw, factor: f64) {
-    for (total, series) in sum.iter_mut().zip(raw) {
-        if let Some(series) = series {
-            total.iter_mut().zip(series).for_each(|(t, x)| *t += factor * x);
-        }
-    }
 }
 
 impl Division {

@@ -21,8 +21,7 @@ use crate::diagnose::scene::Axes;
 use crate::math::rms::about_mean;
 use crate::math::shared_work;
 
-/// A regressor before whitening: a series for every axis it acts on.
-pub type Raw = [Option<Vec<f64>>; 3];
+pub use crate::diagnose::axes::Raw;
 
 /// One axis of a whitened regressor: `factor` times what is shared with the same regressor of other sizes.
 #[derive(Debug, Clone)]

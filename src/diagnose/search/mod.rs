@@ -18,6 +18,7 @@ pub use imitate::imitation;
 pub use refine::refine;
 pub use weigh::{Left, Weighed, fit_noise, residual, weigh_with_own_noise};
 
+use super::axes;
 use super::catalogue::{Scale, Shape, Theta};
 use super::design::{Chosen, Column, Frame, Normal, OnAxis};
 use super::scene::{Axes, Scene};
@@ -216,18 +217,14 @@ impl Set {
         self.members
             .iter()
             .map(|m| {
-                let mut sum: Axes = std::array::from_fn(|_| vec![0.0; n]);
+                let mut sum = axes::nothing(n);
                 let Some(shape) = shape_at(scene, &entries[m.entry], &m.theta) else { return sum };
                 let columns = shape.columns();
                 let picked: Vec<usize> = m.axis.map_or_else(|| (0..columns.len()).collect(), |a| vec![a]);
                 for j in picked {
                     let factor = if m.point.fixed { 1.0 } else { mean[next] };
                     next += usize::from(!m.point.fixed);
-                    for (total, series) in sum.iter_mut().zip(&columns[j]) {
-                        if let Some(series) = series {
-                            total.iter_mut().zip(series).for_each(|(t, x)| *t += factor * x);
-                        }
-                    }
+                    axes::add_regressor(&mut sum, &columns[j], factor);
                 }
                 sum
             })
@@ -340,9 +337,14 @@ pub fn best_of_entry(seen: &Seen, index: usize, chosen: &Chosen) -> (f64, Member
 /// Sorts sets by their score and keeps the best of those that have the same members.
 pub fn distinct(sets: &mut Vec<Set>) {
     sets.sort_by(|a, b| b.score.total_cmp(&a.score));
+    retain_first(sets, Set::key);
+}
+
+/// Keeps the first of those that have the same members.
+pub fn retain_first<T>(sets: &mut Vec<T>, key: impl Fn(&T) -> Vec<usize>) {
     let mut keys: Vec<Vec<usize>> = Vec::new();
     sets.retain(|set| {
-        let key = set.key();
+        let key = key(set);
         let new = !keys.contains(&key);
         keys.push(key);
         new

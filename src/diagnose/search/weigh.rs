@@ -2,6 +2,7 @@
 //! equal terms.
 
 use super::{Entry, Set, refine};
+use crate::diagnose::axes;
 use crate::diagnose::design::Frame;
 use crate::diagnose::noise::{self, AxisNoise};
 use crate::diagnose::scene::{Axes, Scene};
@@ -55,11 +56,7 @@ impl Weighed {
 /// Residual of a set at the noise of a frame.
 pub fn residual(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) -> Axes {
     let mut left = scene.residual_ng.clone();
-    for part in set.contributions(scene, frame, entries) {
-        for (total, series) in left.iter_mut().zip(&part) {
-            total.iter_mut().zip(series).for_each(|(t, x)| *t -= x);
-        }
-    }
+    set.contributions(scene, frame, entries).iter().for_each(|part| axes::add(&mut left, part, -1.0));
     left
 }
 

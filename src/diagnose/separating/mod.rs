@@ -21,6 +21,7 @@ use crate::units::NANO_G_M_S2;
 
 use self::outcome::{Action, Candidate, Outcome, Pair, round};
 use super::answer::SeparatingObservation;
+use super::axes;
 use super::case::{Ancillary, Case, Expectation, Simulation, WINDOW_STRIDE_S};
 use super::catalogue::{Effect, Shape, Theta};
 use super::design::{Chosen, Column, Frame, Raw};
@@ -202,7 +203,7 @@ impl Contest {
                     let slope = slope(scene, part, coefficients, j, p.step, turned, &here.sum);
                     columns.extend(slope.map(|raw| frame.column(&raw, THETA_STEPS * p.step)));
                 }
-                add(&mut sum, &here.sum, 1.0);
+                axes::add(&mut sum, &here.sum, 1.0);
             }
             predicted.push(sum);
             free.push(columns);
@@ -242,14 +243,9 @@ fn contribution(
     let shape = (part.effect.signature)(scene, theta)?;
     let is_fixed = matches!(shape, Shape::Fixed(_));
     let columns: Vec<Raw> = shape.columns().into_iter().map(|raw| seen_by_sensor(raw, part.effect, turned)).collect();
-    let mut sum: Axes = std::array::from_fn(|_| vec![0.0; scene.schedule.len()]);
+    let mut sum = axes::nothing(scene.schedule.len());
     for (j, raw) in columns.iter().enumerate() {
-        let factor = if is_fixed { 1.0 } else { coefficients[j] };
-        for (total, series) in sum.iter_mut().zip(raw) {
-            if let Some(series) = series {
-                total.iter_mut().zip(series).for_each(|(t, x)| *t += factor * x);
-            }
-        }
+        axes::add_regressor(&mut sum, raw, if is_fixed { 1.0 } else { coefficients[j] });
     }
     Some(Contribution { columns, is_fixed, sum })
 }
@@ -275,12 +271,6 @@ fn slope(
     let (high, low) = (high.unwrap_or_else(|| here.clone()), low.unwrap_or_else(|| here.clone()));
     (span > 0.0)
         .then(|| std::array::from_fn(|k| Some(high[k].iter().zip(&low[k]).map(|(a, b)| (a - b) / span).collect())))
-}
-
-fn add(sum: &mut Axes, part: &Axes, factor: f64) {
-    for (total, series) in sum.iter_mut().zip(part) {
-        total.iter_mut().zip(series).for_each(|(t, x)| *t += factor * x);
-    }
 }
 
 /// Flies a candidate and has the sets compete on it.

@@ -25,6 +25,7 @@ use self::proportion::of_proportion;
 use self::stands::tried;
 use self::unnamed::{hypothesis, near_fail, of_failure, of_remains};
 use super::answer::{Diagnosis, LEAST_PROBABILITY, Located, Source, Verdict};
+use super::axes;
 use super::bursts::OUT;
 use super::case::{Event, KINDS_TRIED, SPIKE};
 use super::catalogue::Effect;
@@ -374,11 +375,7 @@ fn covariate(library: &Library, entry: usize) -> String {
 }
 
 fn sum(scene: &Scene, parts: &[Axes]) -> Axes {
-    let mut total: Axes = std::array::from_fn(|_| vec![0.0; scene.schedule.len()]);
-    for part in parts {
-        for (t, p) in total.iter_mut().zip(part) {
-            t.iter_mut().zip(p).for_each(|(a, b)| *a += b);
-        }
-    }
+    let mut total = axes::nothing(scene.schedule.len());
+    parts.iter().for_each(|part| axes::add(&mut total, part, 1.0));
     total
 }
