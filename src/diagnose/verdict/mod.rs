@@ -38,6 +38,7 @@ use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{Entry, Family, Member, Set, Weighed};
 use super::solve::{Library, Solution};
+use super::trial::Tried;
 
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
 const EVIDENCE_SHARE: f64 = 0.8;
@@ -134,81 +135,102 @@ fn of_the_mismatch(
     notes.extend(refusals);
     let judged = judge(scene, library, solution, &listed, proof);
     let Judged { open_wins, failure, .. } = judged;
-    if judged.verdict != Verdict::Unexplained {
+    let chosen = judged.on_trial.as_ref().map(|(weighed, _)| *weighed);
+    if judged.verdict != Verdict::Unexplained || chosen.is_none() {
         notes.extend(failure.clone());
     }
-    let chosen = judged.on_trial.as_ref().map(|(weighed, _)| *weighed);
     let (verdict, least, remains) = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
     let tried = judged.on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
     let (of_evidence, by_remains) = (proof.probability / EVIDENCE_SHARE, least / (1.0 - EVIDENCE_SHARE));
     let overall = of_evidence.min(by_remains).clamp(LEAST_PROBABILITY, 1.0);
-    let false_alarm_from = Some(if by_remains < of_evidence { Source::Remains } else { proof.source });
-    let statistic = Some(proof.statistic);
-    let slow_evidence = Some(solution.null.slow_evidence);
     let mut answer = Diagnosis {
         verdict,
-        false_alarm_from,
-        statistic,
-        slow_evidence,
+        false_alarm_from: Some(if by_remains < of_evidence { Source::Remains } else { proof.source }),
+        statistic: Some(proof.statistic),
+        slow_evidence: Some(solution.null.slow_evidence),
+        notes,
         ..Diagnosis::nothing(&scene.case.header.id, overall)
     };
     answer.located.covariates =
         locate::covariates(solution.singles.iter().map(|(i, score)| (covariate(library, *i), *score)));
-    let null_frame = solution.null.frame(scene);
-    let Some(weighed) = chosen else {
-        answer.notes = notes;
-        answer.located = unclaimed(scene, library, &null_frame, solution, std::mem::take(&mut answer.located));
-        if let Some(r) = remains {
-            answer.located = of_what_remains(scene, &null_frame, &r, answer.located);
+    let findings = Findings { scene, library, solution, listed, open_wins, failure, remains, tried };
+    let (answer, signal) = match chosen {
+        None => findings.of_nothing(answer),
+        Some(weighed) => findings.of_a_set(answer, weighed),
+    };
+    (answer, signal, ladder(library, solution))
+}
+
+/// What was found, before it is told.
+struct Findings<'a> {
+    scene: &'a Scene<'a>,
+    library: &'a Library,
+    solution: &'a Solution,
+    /// Listed sets whose sizes can be believed.
+    listed: Vec<&'a Weighed>,
+    open_wins: bool,
+    failure: Option<String>,
+    remains: Option<Remains>,
+    tried: Tried,
+}
+
+impl Findings<'_> {
+    /// Of no set: where the strongest single one is, what remains, and how small everything must be.
+    fn of_nothing(self, mut answer: Diagnosis) -> (Diagnosis, Axes) {
+        let Self { scene, library, solution, .. } = self;
+        let frame = solution.null.frame(scene);
+        answer.located = unclaimed(scene, library, &frame, solution, answer.located);
+        if let Some(r) = self.remains {
+            answer.located = of_what_remains(scene, &frame, &r, answer.located);
             answer.hypothesis = Some(of_remains(&r, ""));
         }
-        if verdict == Verdict::Consistent && failure.is_none() {
-            answer.alternatives = nearest(library, &solution.null, &listed);
+        if answer.verdict == Verdict::Consistent && self.failure.is_none() {
+            answer.alternatives = nearest(library, &solution.null, &self.listed);
         }
-        answer.upper_limits = upper_limits(library, &null_frame, &Set::default());
-        answer.fit =
-            Some(fit(scene, library, &null_frame, &solution.null, &Set::default(), tried, &mut answer.notes).0);
-        return (answer, std::array::from_fn(|_| vec![0.0; scene.schedule.len()]), ladder(library, solution));
-    };
-    let (frame, set) = weighed.framed(scene, &library.entries);
-    let (fit, inflation) = fit(scene, library, &frame, weighed, &set, tried, &mut notes);
-    let told = set.with_prior_sizes(TOLD);
-    let fits = model::parameters(scene, &frame, &library.entries, &told, inflation);
-    let contributions = told.contributions(scene, &frame, &library.entries);
-    let best = Best { weighed, frame, set, fits, contributions };
-    answer.fit = Some(fit);
-    let signal = sum(scene, &best.contributions);
-    let covariates = std::mem::take(&mut answer.located.covariates);
-    answer.located = Located {
-        covariates,
-        per_orbit_lines: locate::lines(scene, &best.frame),
-        ..locate::of_signal(scene, &signal, &onsets_s(&best.fits))
-    };
-    answer.upper_limits = upper_limits(library, &best.frame, &best.set);
-    match verdict {
-        Verdict::Unexplained => {
+        let nothing = Set::default();
+        answer.upper_limits = upper_limits(library, &frame, &nothing);
+        answer.fit = Some(fit(scene, library, &frame, &solution.null, &nothing, self.tried, &mut answer.notes).0);
+        (answer, axes::nothing(scene.schedule.len()))
+    }
+
+    /// Of a set that is claimed, or that comes nearest to what cannot be named.
+    fn of_a_set(self, mut answer: Diagnosis, weighed: &Weighed) -> (Diagnosis, Axes) {
+        let Self { scene, library, .. } = self;
+        let (frame, set) = weighed.framed(scene, &library.entries);
+        let (fit, inflation) = fit(scene, library, &frame, weighed, &set, self.tried, &mut answer.notes);
+        let told = set.with_prior_sizes(TOLD);
+        let fits = model::parameters(scene, &frame, &library.entries, &told, inflation);
+        let contributions = told.contributions(scene, &frame, &library.entries);
+        let best = Best { weighed, frame, set, fits, contributions };
+        answer.fit = Some(fit);
+        let signal = sum(scene, &best.contributions);
+        answer.located = Located {
+            covariates: answer.located.covariates,
+            per_orbit_lines: locate::lines(scene, &best.frame),
+            ..locate::of_signal(scene, &signal, &onsets_s(&best.fits))
+        };
+        answer.upper_limits = upper_limits(library, &best.frame, &best.set);
+        if answer.verdict == Verdict::Unexplained {
             let best_ids = ids(library, &best.set).join(" + ");
-            match (failure, remains) {
-                (Some(failure), _) => notes.push(of_failure(&best_ids, &failure)),
+            match (self.failure, self.remains) {
+                (Some(failure), _) => answer.notes.push(of_failure(&best_ids, &failure)),
                 (None, Some(r)) => {
                     answer.located = of_what_remains(scene, &best.frame, &r, answer.located);
                     answer.hypothesis = Some(of_remains(&r, &format!(" It remains beside {best_ids}.")));
                 }
-                (None, None) if open_wins => answer.hypothesis = Some(hypothesis(library, &best, &listed)),
+                (None, None) if self.open_wins => answer.hypothesis = Some(hypothesis(library, &best, &self.listed)),
                 (None, None) => {
-                    let near = near_fail(library, &best, &listed);
-                    notes.push(format!("No set of listed effects can be believed. {near}").trim_end().into());
+                    let near = near_fail(library, &best, &self.listed);
+                    answer.notes.push(format!("No set of listed effects can be believed. {near}").trim_end().into());
                 }
             }
+        } else {
+            answer.notes.extend(of_assumptions(scene, library, &best.set));
+            name(&mut answer, scene, library, &best, &self.listed);
+            answer.notes.extend(of_claims(scene, &answer.effects, answer.verdict));
         }
-        _ => {
-            notes.extend(of_assumptions(scene, library, &best.set));
-            name(&mut answer, scene, library, &best, &listed);
-            notes.extend(of_claims(scene, &answer.effects, answer.verdict));
-        }
+        (answer, signal)
     }
-    answer.notes = notes;
-    (answer, signal, ladder(library, solution))
 }
 
 /// Log posterior odds of every hypothesis against nothing, best first.
