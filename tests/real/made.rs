@@ -189,6 +189,25 @@ fn a_velocity_step_of_one_satellite_is_named_there_and_nowhere_else() {
     assert!(answer.arcs[1].rms_before > 100.0 && answer.arcs[1].rms_after < 2.0 * SIGMA_M);
 }
 
+/// Of three satellites one has a push along its panels' axis that the simulation lacks.
+#[test]
+fn a_push_of_one_satellite_alone_is_named_there() {
+    const Y_M_S2: f64 = 2.5e-9;
+    let mut satellites = vec![gps("G01", 0.0, 10.0), gps("G02", 120.0, 200.0), gps("G03", 240.0, 320.0)];
+    for satellite in &mut satellites {
+        satellite.terms.retain(|(term, _)| *term != Term::YBias);
+    }
+    satellites[2].terms.push((Term::YBias, [Y_M_S2, 0.0]));
+    let made = Made { date: (2018, 5, 14), spacing_s: 900.0, hours: 40.0, satellites };
+    let answer = made.diagnose(&without("srp_y_bias"));
+    assert_eq!((answer.verdict, ids(&answer)), (Verdict::Explained, vec!["srp_y_bias"]), "{:?}", answer.notes);
+    let verdicts: Vec<Verdict> = answer.arcs.iter().map(|a| a.verdict).collect();
+    assert_eq!(verdicts, [Verdict::Consistent, Verdict::Consistent, Verdict::Explained]);
+    close(&answer, 0, "accel_m_s2", Y_M_S2);
+    assert!(answer.effects[0].why.starts_with("G03 alone: "), "{}", answer.effects[0].why);
+    assert!(answer.arcs[2].rms_before > 1.0 && answer.arcs[2].rms_after < 2.0 * SIGMA_M);
+}
+
 #[test]
 fn sunlight_is_found_beside_a_velocity_step_of_the_only_satellite() {
     let mut satellite = gps("E11", 77.0, 150.0);

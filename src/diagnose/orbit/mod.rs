@@ -4,6 +4,7 @@ pub mod arc;
 pub mod forces;
 pub mod held_out;
 pub mod manoeuvre;
+pub mod own;
 pub mod report;
 pub mod search;
 pub mod sp3;

@@ -6,6 +6,7 @@ use super::arc::{Arc, ArcFit};
 use super::forces::Term;
 use super::held_out::missed_m;
 use super::manoeuvre::Manoeuvre;
+use super::own::Own;
 use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m, projected_rms_m};
 use crate::diagnose::answer::{Alternative, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
@@ -23,11 +24,11 @@ pub type Table = Vec<(Term, f64, Vec<Vec<Estimate>>)>;
 
 /// Put a search into an answer.
 pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
-    let (first, last) = (&search.levels[0], &search.levels[search.levels.len() - 1]);
-    let table = table(problem, last);
-    let arcs: Vec<ArcAnswer> = (0..problem.arcs.len()).map(|i| arc_answer(problem, search, &table, i)).collect();
+    let (first, end) = (&search.levels[0], &search.end());
+    let table = table(problem, end);
+    let arcs: Vec<ArcAnswer> = (0..problem.arcs.len()).map(|i| arc_answer(problem, search, end, &table, i)).collect();
     let unexplained = arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).count();
-    let nothing = table.is_empty() && search.manoeuvres.is_empty();
+    let nothing = table.is_empty() && search.manoeuvres.is_empty() && search.own.is_empty();
     // Where nothing is named, a single arc that holds something is no silence.
     let odd = if nothing { unexplained > 0 } else { 2 * unexplained > arcs.len() };
     let verdict = match (nothing, odd) {
@@ -38,8 +39,10 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
     let mut effects = common_effects(problem, search, &table);
     // A velocity step of one satellite among many is that satellite's, and named there and here with its name.
     effects.extend(search.manoeuvres.iter().map(|one| manoeuvre_effect(problem, one, problem.arcs.len() > 1)));
+    effects.extend(search.own.iter().map(|one| own_effect(problem, end, one, true)));
     let strongest_refused = search.refused.first().map_or(0.0, |(_, score)| *score);
     let scores = table.iter().map(|(_, score, _)| *score).chain(search.manoeuvres.iter().map(|one| one.score));
+    let scores = scores.chain(search.own.iter().map(|one| one.score));
     let weakest = scores.fold(f64::INFINITY, f64::min);
     let false_alarm_probability = match verdict {
         Verdict::Explained => (-0.5 * weakest).exp().clamp(LEAST_PROBABILITY, 1.0),
@@ -55,8 +58,8 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
         alternatives: alternatives(search, &table),
         hypothesis: None,
         unit: "m".to_owned(),
-        fit: fit(problem, first, last),
-        upper_limits: limits(problem, search, last),
+        fit: fit(problem, first, end),
+        upper_limits: limits(problem, search, end),
         separating_observation: None,
         cannot_tell_apart: Vec::new(),
         steps: steps(problem, search),
@@ -68,10 +71,12 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
 
 /// Numbers for the figures.
 pub fn plates(problem: &Problem, search: &Search) -> Plates {
+    let end = search.end();
     let each = |of: &dyn Fn(&Arc, &ArcFit) -> Option<f64>| {
         let level =
             |level: &Level| problem.arcs.iter().zip(&level.fits).filter_map(|(arc, fit)| of(arc, fit)).collect();
-        search.levels.iter().map(level).collect::<Vec<Vec<f64>>>()
+        let before = &search.levels[..search.levels.len() - 1];
+        before.iter().chain([&end]).map(level).collect::<Vec<Vec<f64>>>()
     };
     let added = |level: &Level| level.accepted.last().map_or("as it stands", |(term, _)| term.id()).to_owned();
     Plates::Orbit(OrbitPlate {
@@ -138,6 +143,19 @@ fn manoeuvre_effect(problem: &Problem, one: &Manoeuvre, of_many: bool) -> Effect
     }
 }
 
+fn own_effect(problem: &Problem, end: &Level, one: &Own, of_many: bool) -> Effect {
+    let names = one.term.parameters();
+    let values = estimates(problem, end, one.arc, one.term);
+    let parameters = values.iter().zip(names).map(|(e, name)| parameter(name, e.value, e.sigma, one.term.unit()));
+    let [was, is] = one.rms_m;
+    let why = format!(
+        "{}It takes the 3-D residual of the arc from {was:.3} m to {is:.3} m, and no other term does.",
+        if of_many { format!("{} alone: ", problem.arcs[one.arc].id) } else { String::new() }
+    );
+    let rms = vec![(was * was - is * is).max(0.0).sqrt()];
+    effect(one.term, one.score, parameters.collect(), why, rms)
+}
+
 fn with_degree(term: Term, mut parameters: Vec<ParameterAnswer>) -> Vec<ParameterAnswer> {
     if let Term::DegreesFrom(from) = term {
         parameters.push(parameter("from_degree", from as f64, 0.0, "1"));
@@ -186,9 +204,9 @@ fn common(term: Term, name: &str, rows: &[Vec<Estimate>], k: usize) -> Parameter
     parameter(name, median(values), sigma, term.unit())
 }
 
-fn arc_answer(problem: &Problem, search: &Search, table: &Table, i: usize) -> ArcAnswer {
-    let (first, last) = (&search.levels[0], &search.levels[search.levels.len() - 1]);
-    let (arc, fit) = (&problem.arcs[i], &last.fits[i]);
+fn arc_answer(problem: &Problem, search: &Search, end: &Level, table: &Table, i: usize) -> ArcAnswer {
+    let first = &search.levels[0];
+    let (arc, fit) = (&problem.arcs[i], &end.fits[i]);
     let rms_after = fit.rms_m(0..arc.fitted);
     let mut effects: Vec<Effect> = Vec::new();
     for (step, (term, _, rows)) in table.iter().enumerate() {
@@ -204,6 +222,7 @@ fn arc_answer(problem: &Problem, search: &Search, table: &Table, i: usize) -> Ar
     }
     effects
         .extend(search.manoeuvres.iter().filter(|one| one.arc == i).map(|one| manoeuvre_effect(problem, one, false)));
+    effects.extend(search.own.iter().filter(|one| one.arc == i).map(|one| own_effect(problem, end, one, false)));
     let left = rms_after > problem.rms_max_m();
     let (verdict, effects, fitted_beside, note) = if left {
         let note = format!(
@@ -358,10 +377,23 @@ fn located(problem: &Problem, search: &Search, arcs: &[ArcAnswer], nothing: bool
             why: format!("{}: velocity step", own.id),
         }
     };
+    let pushed = |one: &Own| {
+        let own = &problem.arcs[one.arc];
+        Interval {
+            start_s: own.t_s[0],
+            end_s: own.t_s[own.fitted - 1],
+            why: format!("{}: {}", own.id, one.term.name()),
+        }
+    };
     Located {
         axes,
         frame: "lvlh".to_owned(),
-        intervals: odd.iter().filter_map(interval).chain(search.manoeuvres.iter().map(kicked)).collect(),
+        intervals: odd
+            .iter()
+            .filter_map(interval)
+            .chain(search.manoeuvres.iter().map(kicked))
+            .chain(search.own.iter().map(pushed))
+            .collect(),
         ..Located::default()
     }
 }

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::arc::{Arc, ArcFit};
 use super::forces::{Baseline, Environment, Moment, Term};
 use super::manoeuvre::{self, Manoeuvre};
+use super::own::{self, Own};
 use crate::diagnose::measured::spread::{median, memory};
 use crate::physics::integrator::State;
 
@@ -72,11 +73,22 @@ pub struct Search {
     pub refused: Vec<(Term, f64)>,
     /// Velocity steps of single satellites, with the last level's errors.
     pub manoeuvres: Vec<Manoeuvre>,
+    /// Pushes of single satellites beside the last level.
+    pub own: Vec<Own>,
+}
+
+impl Search {
+    /// The last level, with what single satellites have for themselves.
+    pub fn end(&self) -> Level {
+        let mut end = self.levels[self.levels.len() - 1].clone();
+        self.own.iter().for_each(|own| end.fits[own.arc] = own.fit.clone());
+        end
+    }
 }
 
 impl Problem {
     /// Candidates that the baseline does not hold.
-    fn candidates(&self, baseline: &Baseline) -> Vec<Term> {
+    pub(super) fn candidates(&self, baseline: &Baseline) -> Vec<Term> {
         let mut terms = vec![Term::Sun, Term::Moon];
         if baseline.degree < self.environment.field.degree() {
             terms.push(Term::DegreesFrom(baseline.degree.max(1) + 1));
@@ -138,8 +150,9 @@ impl Problem {
             levels.push(next);
         }
         let levels = self.look_back(levels);
-        let manoeuvres = manoeuvre::found(self, &levels[levels.len() - 1]);
-        Search { levels, first_scores, refused, manoeuvres }
+        let last = &levels[levels.len() - 1];
+        let (manoeuvres, own) = (manoeuvre::found(self, last), own::found(self, last));
+        Search { levels, first_scores, refused, manoeuvres, own }
     }
 
     /// Rms that one arc would keep with a term (as it stands without one), by its linear columns, m.

@@ -1,0 +1,53 @@
+//! A push of radiation or air that one satellite has for itself: where an arc keeps more than the stated accuracy allows with all that
+//! is common, and one term of the catalogue takes that away.
+//!
+//! It belongs to that arc and is no common cause. One that another term replaces as well is not named. Not here: what most arcs ask for
+//! (`search`), velocity steps (`manoeuvre`).
+
+use super::arc::ArcFit;
+use super::forces::Term;
+use super::search::{Level, Problem, SCORE_MIN, evidence, with};
+
+/// It must leave less than this part of the rms.
+const LEFT_MAX: f64 = 0.2;
+/// Evidence by which it must be above every other term that would do: twice the logarithm of odds of twenty.
+const MARGIN: f64 = 6.0;
+
+/// One found.
+#[derive(Debug, Clone)]
+pub struct Own {
+    /// Place of its arc.
+    pub arc: usize,
+    /// The term.
+    pub term: Term,
+    /// Evidence.
+    pub score: f64,
+    /// 3-D rms of the arc without it and with it, m.
+    pub rms_m: [f64; 2],
+    /// The arc with it.
+    pub fit: ArcFit,
+}
+
+/// Those beside a level.
+pub fn found(problem: &Problem, level: &Level) -> Vec<Own> {
+    (0..problem.arcs.len()).filter_map(|i| of_arc(problem, level, i)).collect()
+}
+
+fn of_arc(problem: &Problem, level: &Level, i: usize) -> Option<Own> {
+    let (arc, fit) = (&problem.arcs[i], &level.fits[i]);
+    let was = fit.rms_m(0..arc.fitted);
+    if problem.arcs.len() == 1 || fit.impulse.is_some() || !was.is_finite() || was <= problem.rms_max_m() {
+        return None;
+    }
+    let tried = |term: Term| {
+        let with = problem.fit_arc(arc, &with(&level.baseline, term), Some(fit));
+        let is = with.rms_m(0..arc.fitted);
+        let own = Own { arc: i, term, score: evidence(arc, fit, term), rms_m: [was, is], fit: with };
+        (is <= problem.rms_max_m() && is < LEFT_MAX * was && own.score > SCORE_MIN).then_some(own)
+    };
+    let free = problem.candidates(&level.baseline).into_iter().filter(|term| !term.is_known_size());
+    let mut all: Vec<Own> = free.filter_map(tried).collect();
+    all.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let second = all.get(1).map_or(f64::NEG_INFINITY, |own| own.score);
+    all.into_iter().next().filter(|own| own.score > second + MARGIN)
+}
