@@ -28,7 +28,9 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
     let table = table(problem, end);
     let arcs: Vec<ArcAnswer> = (0..problem.arcs.len()).map(|i| arc_answer(problem, search, end, &table, i)).collect();
     let unexplained = arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).count();
-    let nothing = table.is_empty() && search.manoeuvres.is_empty() && search.own.is_empty();
+    let named: Vec<bool> =
+        table.iter().enumerate().map(|(step, (term, ..))| explains(problem, search, &arcs, step, *term)).collect();
+    let nothing = !named.contains(&true) && search.manoeuvres.is_empty() && search.own.is_empty();
     // Where nothing is named, a single arc that holds something is no silence.
     let odd = if nothing { unexplained > 0 } else { 2 * unexplained > arcs.len() };
     let verdict = match (nothing, odd) {
@@ -36,12 +38,14 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
         (true, false) => Verdict::Consistent,
         (false, false) => Verdict::Explained,
     };
-    let mut effects = common_effects(problem, search, &table);
+    let common = common_effects(problem, search, &table).into_iter().zip(&named);
+    let mut effects: Vec<Effect> = common.filter_map(|(effect, named)| named.then_some(effect)).collect();
     // A velocity step of one satellite among many is that satellite's, and named there and here with its name.
     effects.extend(search.manoeuvres.iter().map(|one| manoeuvre_effect(problem, one, problem.arcs.len() > 1)));
     effects.extend(search.own.iter().map(|one| own_effect(problem, end, one, true)));
     let strongest_refused = search.refused.first().map_or(0.0, |(_, score)| *score);
-    let scores = table.iter().map(|(_, score, _)| *score).chain(search.manoeuvres.iter().map(|one| one.score));
+    let of_table = table.iter().zip(&named).filter_map(|((_, score, _), named)| named.then_some(*score));
+    let scores = of_table.chain(search.manoeuvres.iter().map(|one| one.score));
     let scores = scores.chain(search.own.iter().map(|one| one.score));
     let weakest = scores.fold(f64::INFINITY, f64::min);
     let false_alarm_probability = match verdict {
@@ -67,6 +71,13 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
         effects: in_order(effects),
         arcs,
     }
+}
+
+/// Whether a term explains any arc that asks for it: a push of unknown size that is asked for by arcs alone that stay unexplained with it
+/// is no name for what is in them.
+fn explains(problem: &Problem, search: &Search, arcs: &[ArcAnswer], step: usize, term: Term) -> bool {
+    let asks = |i: usize| evidence(&problem.arcs[i], &search.levels[step].fits[i], term) > 0.0;
+    term.is_known_size() || (0..arcs.len()).any(|i| arcs[i].verdict != Verdict::Unexplained && asks(i))
 }
 
 /// Numbers for the figures.
