@@ -297,6 +297,7 @@ fn low() -> Satellite {
         start,
         terms: vec![(Term::SolarRadiation, [3e-8, 0.0]), (Term::Drag, [1.7, 0.0])],
         kick: None,
+        second: None,
     }
 }
 
