@@ -16,7 +16,7 @@ use tokio_util::sync::{CancellationToken, DropGuard};
 use crate::api::{self, App, Metrics};
 use crate::config::{Config, ConfigFaults};
 use crate::diagnose::case::Expectation;
-use crate::diagnose::live::Report;
+use crate::diagnose::live::{Report, digest};
 use crate::hub::Hub;
 use crate::hub::desk::Desk;
 use crate::hub::status::{Board, Phase};
@@ -118,9 +118,18 @@ impl Service {
         let hub = Arc::new(Hub::new(&settings.mission, settings.link.spacecraft_id, queue, samples));
         let board = Arc::new(Board::default());
         let desk = Arc::new(Desk::default());
-        if let Some(expected) = &expected {
-            desk.show(Report::waiting(&expected.header.id));
-        }
+        // Read before anybody is answered: what was found before the start is there from the first answer on.
+        let journal = {
+            let log = log.clone();
+            blocking(move || log.journal()).await??
+        };
+        let diagnosis = expected.zip(config.diagnosis.as_ref());
+        let earlier = diagnosis.as_ref().and_then(|(expected, diagnosis)| {
+            let earlier = diagnosing::earlier(&journal.entries, expected, &diagnosis.policy);
+            let waiting = || Report::waiting(&expected.header.id, digest(expected, &diagnosis.policy));
+            desk.show(earlier.clone().unwrap_or_else(waiting));
+            earlier
+        });
         let closing = CancellationToken::new();
         let app = Arc::new(App {
             hub: hub.clone(),
@@ -139,7 +148,7 @@ impl Service {
         let serving = tokio::spawn(http::serve(http, api::router(app), closing.clone()));
         let writer = {
             let (log, station, hub, board) = (log.clone(), station.clone(), hub.clone(), board.clone());
-            blocking(move || Writer::restore(log, station, hub, board)).await??
+            blocking(move || Writer::restore(log, journal, station, hub, board)).await??
         };
         let recording = match config.recording {
             false => None,
@@ -152,10 +161,10 @@ impl Service {
             let (runtime, give_up) = (tokio::runtime::Handle::current(), give_up.clone());
             in_background(PRODUCTS_GIVE_WAY, move || writer.run(&runtime, parts_out, &give_up))
         };
-        let diagnosing = expected.zip(config.diagnosis.as_ref()).map(|(expected, diagnosis)| {
+        let diagnosing = diagnosis.map(|(expected, diagnosis)| {
             let stop = CancellationToken::new();
             let (station, hub, policy) = (station.clone(), hub.clone(), diagnosis.policy.clone());
-            let work = Diagnosing { station, hub, desk, expected, policy, gate, stop: stop.clone() };
+            let work = Diagnosing { station, hub, desk, expected, policy, earlier, gate, stop: stop.clone() };
             let runtime = tokio::runtime::Handle::current();
             (stop.drop_guard(), in_background(SEARCHES_GIVE_WAY, move || work.run(&runtime)))
         });

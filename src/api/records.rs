@@ -120,9 +120,9 @@ pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
 /// What the simulation lacks: the running diagnosis with its progress, or, where none runs, the `diagnosis.json` that lies in the
 /// data directory.
 #[utoipa::path(get, path = "/diagnosis", tag = "diagnosis",
-    responses((status = 200, body = Object, description = "the members of diagnosis.json; of a running diagnosis also `progress`: state \
-        (collecting, searching, current, refused, failed), sentence, windows_seen, windows_searched, first_clock_s, last_clock_s, revision, \
-        calibration, time_to_detect_s, time_to_name_s, counted_from (onset, first_data), counted_from_clock_s, searches, alarm_clock_s, \
+    responses((status = 200, body = Object, description = "the members of diagnosis.json, verdict and false_alarm_probability null while there is no \
+        answer; of a running diagnosis also `progress`: state (collecting, searching, current, refused, failed), sentence, windows_seen, \
+        windows_searched, first_clock_s, last_clock_s, revision, calibration, inputs, from_scratch, time_to_detect_s, time_to_name_s, counted_from (onset, first_data), counted_from_clock_s, searches, alarm_clock_s, \
         name_clock_s, name, alarms_withdrawn, searches_failed, looks"),
         (status = 404, description = "there is none")))]
 pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Response, Problem> {

@@ -79,18 +79,18 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Takes up where the log ends: replays it, restores the hub, publishes what the journal lacks.
+    /// Takes up where the log ends: replays it, restores the hub from its journal, publishes what that lacks.
     ///
     /// # Errors
     /// When the log cannot be read.
     pub fn restore(
         log: Arc<RawLog>,
+        journal: Journal,
         station: SharedStation,
         hub: Arc<Hub>,
         board: Arc<Board>,
     ) -> Result<Self, StoreError> {
         let start = Instant::now();
-        let journal = log.journal()?;
         let messages = journal.entries.len();
         let mut batch = 0;
         let mut orphans;

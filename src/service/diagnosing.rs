@@ -14,9 +14,10 @@ use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
 use crate::diagnose::case::Expectation;
-use crate::diagnose::live::{Live, Milestones, Policy, Report, Seen};
+use crate::diagnose::live::{Live, News, Policy, Report, Seen, digest, news};
 use crate::diagnose::recorder::usable;
 use crate::hub::desk::Desk;
+use crate::hub::journal::Entry;
 use crate::hub::wire::members;
 use crate::hub::{Body, Hub, Topic};
 use crate::ingest::writer::SharedStation;
@@ -42,6 +43,8 @@ pub struct Diagnosing {
     pub expected: Expectation,
     /// When and how to look.
     pub policy: Policy,
+    /// What an earlier run told of the same inputs.
+    pub earlier: Option<Report>,
     /// Called before every search.
     pub gate: Gate,
     /// Cancelled when it must end; a search under way is given up within a second or so.
@@ -51,15 +54,14 @@ pub struct Diagnosing {
 impl Diagnosing {
     /// Works until it is stopped.
     pub fn run(self, runtime: &Handle) {
-        let Self { station, hub, desk, expected, policy, gate, stop } = self;
-        let case = expected.header.id.clone();
-        let (milestones, mut told_revision) =
-            hub.last_told(Topic::Diagnosis).and_then(|json| earlier(&json)).unwrap_or_default();
-        let mut live = match Live::new(expected, policy, milestones) {
+        let Self { station, hub, desk, expected, policy, earlier, gate, stop } = self;
+        let (case, inputs) = (expected.header.id.clone(), digest(&expected, &policy));
+        let mut told = earlier.clone();
+        let mut live = match Live::new(expected, policy, earlier) {
             Ok(live) => live,
             Err(error) => {
                 tracing::error!(%error, "no diagnosis runs: the ancillary data defeat the physics");
-                return desk.show(Report::refused(&case, &error));
+                return desk.show(Report::refused(&case, inputs, &error));
             }
         };
         let mut head = hub.subscribe();
@@ -70,14 +72,14 @@ impl Diagnosing {
             let seen = Seen::from(&known);
             desk.show(live.report(seen.windows, false));
             if !live.is_due(&seen, is_coming) {
-                is_coming = runtime.block_on(news(&mut head, is_coming, &stop));
+                is_coming = runtime.block_on(something_new(&mut head, is_coming, &stop));
                 continue;
             }
             desk.show(live.report(seen.windows, true));
             // A search that panics is one answer less, and nothing else.
             let look = AssertUnwindSafe(|| {
                 gate();
-                live.look(known, &|| stop.is_cancelled())
+                live.look(known, is_coming, &|| stop.is_cancelled())
             });
             let looked = catch_unwind(look).unwrap_or_else(|_| {
                 tracing::error!(
@@ -89,9 +91,10 @@ impl Diagnosing {
             });
             if looked {
                 let report = live.report(seen.windows, false);
-                if report.progress.revision != told_revision {
+                if report.is_news_after(told.as_ref()) {
+                    log(&hub, &news(told.as_ref(), &report));
                     hub.tell(message(&report));
-                    told_revision.clone_from(&report.progress.revision);
+                    told = Some(report.clone());
                 }
                 desk.show(report);
             }
@@ -100,7 +103,7 @@ impl Diagnosing {
 }
 
 /// Waits for something new; false when nothing came for a while. Once that is known, it waits for as long as it takes.
-async fn news(head: &mut watch::Receiver<u64>, is_coming: bool, stop: &CancellationToken) -> bool {
+async fn something_new(head: &mut watch::Receiver<u64>, is_coming: bool, stop: &CancellationToken) -> bool {
     let changed = async {
         match is_coming {
             true => tokio::time::timeout(QUIET, head.changed()).await.is_ok(),
@@ -120,19 +123,63 @@ async fn news(head: &mut watch::Receiver<u64>, is_coming: bool, stop: &Cancellat
     }
 }
 
-/// The message on topic `diagnosis`: the report but for its looks, which readers of messages have had.
+/// One line in the log for everything that changed.
+fn log(hub: &Hub, news: &[News]) {
+    let (mission, spacecraft) = (hub.mission(), hub.spacecraft_id());
+    for news in news {
+        match news {
+            News::Alarm { clock_s, verdict } => {
+                tracing::warn!(
+                    mission,
+                    spacecraft,
+                    clock_s,
+                    verdict = verdict.word(),
+                    "diagnosis: the alarm is raised"
+                );
+            }
+            News::AlarmWithdrawn { clock_s } => {
+                tracing::warn!(mission, spacecraft, clock_s, "diagnosis: the alarm is withdrawn");
+            }
+            News::Name { clock_s, name } => {
+                tracing::warn!(
+                    mission,
+                    spacecraft,
+                    clock_s,
+                    name = name.join(" + "),
+                    "diagnosis: what is missing has a name"
+                );
+            }
+            News::NameWithdrawn { clock_s, name } => {
+                tracing::warn!(
+                    mission,
+                    spacecraft,
+                    clock_s,
+                    name = name.join(" + "),
+                    "diagnosis: the name is withdrawn"
+                );
+            }
+            News::Refused { sentence } => {
+                tracing::warn!(mission, spacecraft, sentence, "diagnosis: refused");
+            }
+        }
+    }
+}
+
+/// The message on topic `diagnosis`: the report with its last look alone, for readers of messages have had those before.
 fn message(report: &Report) -> Body {
     let mut report = report.clone();
-    report.progress.looks.clear();
+    let looks = &mut report.progress.looks;
+    looks.drain(..looks.len().saturating_sub(1));
     let clock_s = report.progress.last_clock_s.unwrap_or_default();
     let clock = Clock::from_tenths((clock_s * 10.0).round() as i64);
     Body::Told { topic: Topic::Diagnosis, clock, json: members("diagnosis", &report) }
 }
 
-/// Milestones and revision of a message told by an earlier run.
-fn earlier(json: &str) -> Option<(Milestones, String)> {
-    let value: serde_json::Value = serde_json::from_str(&format!("{{{json}}}")).ok()?;
-    let progress = value.get("progress")?;
-    let revision = progress.get("revision")?.as_str()?.to_string();
-    Some((serde_json::from_value(progress.clone()).ok()?, revision))
+/// What earlier runs told of the same inputs, out of the journal.
+pub fn earlier(journal: &[Entry], expected: &Expectation, policy: &Policy) -> Option<Report> {
+    let told = journal.iter().filter_map(|entry| match entry {
+        Entry::Told { topic: Topic::Diagnosis, json, .. } => Some(format!("{{{json}}}")),
+        _ => None,
+    });
+    Report::kept(&expected.header.id, digest(expected, policy), told)
 }

@@ -205,9 +205,9 @@ async function refreshDiagnosis() {
   byId("diagnosis").hidden = !answer;
   if (!answer) return;
   const p = answer.progress, kinds = { consistent: "good", explained: "bad", ambiguous: "wait", unexplained: "bad" };
-  const said = !p || p.windows_searched > 0;
-  chip("verdict", said ? answer.verdict : p.state, said ? kinds[answer.verdict] : "");
-  byId("verdict").dataset.verdict = answer.verdict;
+  const said = answer.verdict !== null;
+  chip("verdict", said ? answer.verdict : p.state, said ? kinds[answer.verdict] : p.state === "refused" ? "wait" : "");
+  byId("verdict").dataset.verdict = answer.verdict ?? "";
   byId("diagnosis-sentence").textContent = p ? p.sentence : "";
   const list = answer.effects.flatMap((e) => e.parameters.map((q, n) =>
     [[n ? "" : e.name, q.name.replaceAll("_", " "), `${significant(q.value)} ± ${significant(q.sigma)} ${q.unit === "1" ? "" : q.unit}`]]));
