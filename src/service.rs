@@ -127,7 +127,7 @@ impl Service {
         let earlier = diagnosis.as_ref().and_then(|(expected, diagnosis)| {
             let earlier = diagnosing::earlier(&journal.entries, expected, &diagnosis.policy);
             let waiting = || Report::waiting(&expected.header.id, digest(expected, &diagnosis.policy));
-            desk.show(earlier.clone().unwrap_or_else(waiting));
+            desk.show(earlier.as_ref().map_or_else(waiting, Report::taken_up));
             earlier
         });
         let closing = CancellationToken::new();
@@ -274,11 +274,15 @@ fn in_background<T: Send + 'static>(niceness: i32, work: impl FnOnce() -> T + Se
     })
 }
 
+/// All processors but one, which is left to those who answer.
+fn others() -> usize {
+    std::thread::available_parallelism().map_or(1, |processors| processors.get().saturating_sub(1).max(1))
+}
+
 /// The threads that share the work of a calibration give way too, and leave one processor to those who answer. A pool that the process
 /// has already stays as it is.
 fn shared_work_gives_way() {
-    let others = std::thread::available_parallelism().map_or(1, |processors| processors.get().saturating_sub(1).max(1));
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(others).start_handler(|_| give_way(PRODUCTS_GIVE_WAY));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(others()).start_handler(|_| give_way(PRODUCTS_GIVE_WAY));
     if let Err(error) = pool.build_global() {
         tracing::debug!(%error, "the threads of shared work keep their priority");
     }

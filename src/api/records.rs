@@ -122,7 +122,7 @@ pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
 #[utoipa::path(get, path = "/diagnosis", tag = "diagnosis",
     responses((status = 200, body = Object, description = "the members of diagnosis.json, verdict and false_alarm_probability null while there is no \
         answer; of a running diagnosis also `progress`: state (collecting, searching, current, refused, failed), sentence, windows_seen, \
-        windows_searched, first_clock_s, last_clock_s, revision, calibration, inputs, from_scratch, time_to_detect_s, time_to_name_s, counted_from (onset, first_data), counted_from_clock_s, searches, alarm_clock_s, \
+        windows_beyond, windows_searched, first_clock_s, last_clock_s, revision, calibration, inputs, from_scratch, time_to_detect_s, time_to_name_s, counted_from (onset, first_data), counted_from_clock_s, searches, alarm_clock_s, \
         name_clock_s, name, alarms_withdrawn, searches_failed, looks"),
         (status = 404, description = "there is none")))]
 pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Response, Problem> {

@@ -299,6 +299,7 @@ fn note_diagnosis(report: &Report) {
     }
     gauge!("oare_diagnosis_searching").set(f64::from(u8::from(progress.state == Progress::Searching)));
     gauge!("oare_diagnosis_windows_seen").set(progress.windows_seen as f64);
+    gauge!("oare_diagnosis_windows_beyond").set(progress.windows_beyond as f64);
     gauge!("oare_diagnosis_windows_searched").set(progress.windows_searched as f64);
     gauge!("oare_diagnosis_alarm").set(f64::from(u8::from(progress.milestones.alarm_clock_s.is_some())));
     gauge!("oare_diagnosis_time_to_detect_seconds").set(progress.time_to_detect_s.unwrap_or(f64::NAN));

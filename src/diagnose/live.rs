@@ -15,15 +15,16 @@ use std::sync::Arc;
 
 pub use inputs::digest;
 pub use progress::{CountedFrom, Look, Milestones, News, Progress, Report, State, news};
-use progress::{add, digits, waiting_sentence};
+use progress::{add, beyond_sentence, digits, waiting_sentence};
 
 use super::answer::{Diagnosis, Source};
-use super::case::{Case, Expectation, WINDOW_STRIDE_S, WINDOWS_MIN};
+use super::case::{Case, Expectation, HALF_WINDOW_S, Recording, WINDOW_STRIDE_S, WINDOWS_MIN};
 use super::error::CaseError;
 use super::noise::AxisNoise;
 use super::null_table;
 use super::order::solve_at_its_order;
-use super::recorder::Usable;
+use super::recorder::ALL_TIME;
+pub use super::recorder::Seen;
 use super::report;
 use super::scene::{Scene, Surroundings};
 use super::solve::{Library, Stop, null_noise};
@@ -75,23 +76,6 @@ struct Answer {
     from_scratch: bool,
 }
 
-/// What there is to look at.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Seen {
-    /// Usable windows.
-    pub windows: usize,
-    /// Digest of their revisions.
-    pub digest: u64,
-    /// Version of their calibration.
-    pub calibration: u32,
-}
-
-impl From<&Usable> for Seen {
-    fn from(usable: &Usable) -> Self {
-        Self { windows: usable.recording.clock_s.len(), digest: usable.digest, calibration: usable.calibration }
-    }
-}
-
 impl Live {
     /// Lays out the physics along the ancillary data; nothing is seen yet but what an `earlier` run told of the same inputs.
     ///
@@ -126,11 +110,26 @@ impl Live {
         })
     }
 
+    /// The span that windows are compared in: of the case, and where simulation and ancillary data hold all of a window.
+    pub fn span_s(&self) -> [f64; 2] {
+        let within = |grid: &[f64]| [grid[0] + HALF_WINDOW_S, grid[grid.len() - 1] - HALF_WINDOW_S];
+        let spans = [within(&self.expected.simulation.clock_s), within(&self.expected.ancillary.clock_s)];
+        let asked = self.expected.header.span_s;
+        spans.iter().fold(asked, |span, other| [span[0].max(other[0]), span[1].min(other[1])])
+    }
+
+    /// The span of the windows that a look takes: where too few can be compared it takes all, and says of all why not.
+    pub fn span_to_take_s(&self, seen: &Seen) -> [f64; 2] {
+        if seen.windows < WINDOWS_MIN { ALL_TIME } else { self.span_s() }
+    }
+
     /// Whether a look is due: enough windows are new, or the old ones have another calibration; or, when nothing more `is_coming`
     /// for now, any difference at all, and where there is none an answer that began at the noise of a look before.
     pub fn is_due(&self, seen: &Seen, is_coming: bool) -> bool {
         if seen.windows < WINDOWS_MIN {
-            return false;
+            // Nothing can be compared, and that is said; later in other words, when nothing more comes.
+            let are_too_few = seen.windows + seen.beyond >= WINDOWS_MIN;
+            return are_too_few && (self.state != State::Refused || (!is_coming && *seen != self.seen));
         }
         if seen.digest == self.seen.digest {
             let has_a_past = self.answer.as_ref().is_some_and(|answer| !answer.from_scratch);
@@ -145,9 +144,8 @@ impl Live {
 
     /// Looks at the windows so far; whether it did: not when `stop` said so in between. When nothing more `is_coming` it looks as if
     /// for the first time, so that where the looks before fell leaves no trace in what is said at rest.
-    pub fn look(&mut self, usable: Usable, is_coming: bool, stop: Stop) -> bool {
-        let seen = Seen::from(&usable);
-        let case = match Case::meet(self.expected.clone(), usable.recording) {
+    pub fn look(&mut self, seen: Seen, recording: Recording, is_coming: bool, stop: Stop) -> bool {
+        let case = match Case::meet(self.expected.clone(), recording) {
             Ok(case) => case,
             Err(error) => {
                 self.seen = seen;
@@ -205,8 +203,9 @@ impl Live {
         );
     }
 
-    /// The answer so far, with so many usable windows known by now, and whether a search is under way.
-    pub fn report(&self, windows_seen: usize, is_searching: bool) -> Report {
+    /// The answer so far, with the usable windows known by now, and whether a search is under way.
+    pub fn report(&self, seen: &Seen, is_searching: bool) -> Report {
+        let windows_seen = seen.windows + seen.beyond;
         let answer = self.answer.as_ref();
         let effects = answer.map_or(&[][..], |answer| &answer.diagnosis.effects);
         let onsets: Vec<f64> = effects.iter().filter_map(|e| e.parameter("onset_s")).collect();
@@ -214,14 +213,18 @@ impl Live {
         let first = answer.map(|answer| answer.span_s[0]);
         let from = if by_onset { onsets.into_iter().reduce(f64::min) } else { first };
         let since = |clock_s: Option<f64>| Some((clock_s? - from?).max(0.0));
-        let sentence = match self.state {
-            State::Collecting => waiting_sentence(windows_seen),
+        let mut sentence = match self.state {
+            State::Collecting => waiting_sentence(seen.windows),
             _ => self.sentence.clone(),
         };
+        if seen.beyond > 0 && self.state != State::Refused {
+            sentence.push_str(&beyond_sentence(seen, self.span_s()));
+        }
         let progress = Progress {
             state: if is_searching { State::Searching } else { self.state },
             sentence,
             windows_seen,
+            windows_beyond: seen.beyond,
             windows_searched: answer.map_or(0, |answer| answer.windows),
             first_clock_s: first,
             last_clock_s: answer.map(|answer| answer.span_s[1]),

@@ -9,6 +9,7 @@ use std::time::Instant;
 
 use oare_ground::config::Config;
 use oare_ground::ingest::wire::LinkConfig;
+use oare_ground::math::shared_work;
 use oare_ground::physics::Vec3;
 use oare_ground::service::Service;
 use oare_ground::service::diagnosing::Gate;
@@ -216,6 +217,36 @@ async fn at_rest_the_answer_is_the_same_whatever_came_before() {
     assert_eq!(answers[0], answers[1]);
 }
 
+/// Nobody believes that windows are watched which the simulation does not reach, and those it reaches are not searched for them again.
+#[tokio::test(flavor = "multi_thread")]
+async fn windows_beyond_the_simulation_are_told_and_cause_no_search() {
+    let [first, second] = &mission().0;
+    let running = start_with(|config| {
+        with_case_and(config, "set = [\"case.end_s=40000.0\"]\n");
+    })
+    .await;
+    running.send(first).await;
+    let before = running.settled(200).await;
+    let progress = &before["progress"];
+    let (end_s, beyond) = (progress["last_clock_s"].as_f64().unwrap(), progress["windows_beyond"].as_u64().unwrap());
+    assert!(end_s <= 40_000.0 && beyond > 0, "{progress:#}");
+    let sentence = progress["sentence"].as_str().unwrap();
+    assert!(sentence.contains(&format!("{beyond} of")) && sentence.contains("to 40000 s"), "{sentence}");
+    let mut live = running.live("topics=diagnosis").await;
+    live.next().await.unwrap();
+    running.send(second).await;
+    let is_known = |d: &Value| d["progress"]["windows_beyond"].as_u64() > Some(beyond + 500);
+    running.wait_for_diagnosis("windows beyond", is_known).await;
+    let after = running.settled(200).await;
+    for same in ["windows_searched", "last_clock_s"] {
+        assert_eq!(after["progress"][same], before["progress"][same], "{same}");
+    }
+    // The second tape has calibrations that bear on the windows before; its 800 windows would be twelve searches.
+    let searches = |d: &Value| d["progress"]["searches"].as_u64().unwrap();
+    assert!(searches(&after) <= searches(&before) + 4, "{after:#}");
+    running.service.drain().await.unwrap();
+}
+
 /// A comparison that cannot be made says so everywhere, and nobody can take it for "all is well".
 #[tokio::test(flavor = "multi_thread")]
 async fn windows_that_cannot_be_compared_have_no_verdict() {
@@ -267,7 +298,10 @@ async fn a_search_that_does_not_end_delays_no_window_and_what_came_meanwhile_is_
     let dir = tempfile::tempdir().unwrap();
     let mut config = config(&dir);
     with_case(&mut config);
-    let running = Running { service: Service::start_gated(config, held.gate()).await.unwrap(), dir };
+    // It holds every thread that a search may have, and products are derived all the same.
+    let gate = held.gate();
+    let on_all_threads = move || drop(shared_work::map(&[(); 64], |()| gate()));
+    let running = Running { service: Service::start_gated(config, Arc::new(on_all_threads)).await.unwrap(), dir };
     running.send(first).await;
     running.wait_for_diagnosis("a search", |d| d["progress"]["state"] == "searching").await;
 

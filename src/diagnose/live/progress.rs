@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use crate::diagnose::answer::{Diagnosis, Located, Verdict};
 use crate::diagnose::case::WINDOWS_MIN;
-use crate::diagnose::error::CaseError;
+use crate::diagnose::recorder::Seen;
 
 /// Looks kept for readers.
 const LOOKS_MAX: usize = 100;
@@ -113,7 +113,10 @@ pub struct Progress {
     pub sentence: String,
     /// Usable windows known.
     pub windows_seen: usize,
-    /// Of those, windows the answer rests on.
+    /// Of those, windows beyond simulation, ancillary data or the span of the case: they are not compared.
+    #[serde(default)]
+    pub windows_beyond: usize,
+    /// Of the others, windows the answer rests on.
     pub windows_searched: usize,
     /// Centre of the first window the answer rests on.
     pub first_clock_s: Option<f64>,
@@ -162,8 +165,8 @@ impl Report {
     }
 
     /// No answer will come.
-    pub fn refused(case: &str, inputs: u64, error: &CaseError) -> Self {
-        Self::without_answer(case, inputs, State::Refused, error.to_string())
+    pub fn refused(case: &str, inputs: u64, why: String) -> Self {
+        Self::without_answer(case, inputs, State::Refused, why)
     }
 
     fn without_answer(case: &str, inputs: u64, state: State, sentence: String) -> Self {
@@ -171,6 +174,7 @@ impl Report {
             state,
             sentence,
             windows_seen: 0,
+            windows_beyond: 0,
             windows_searched: 0,
             first_clock_s: None,
             last_clock_s: None,
@@ -203,20 +207,30 @@ impl Report {
             }
             last = Some(next);
         }
-        let Kept { answer, mut progress } = last?;
-        let searched = " So it was before the start; all windows are searched again.";
-        match &answer {
-            Some(_) if progress.state == State::Failed => progress.sentence = searched.trim_start().into(),
-            Some(_) => progress.sentence.push_str(searched),
-            None => progress.sentence = waiting_sentence(0),
-        }
-        progress.state = if answer.is_some() { State::Searching } else { State::Collecting };
-        Some(Self { case: case.into(), answer, progress })
+        last.map(|Kept { answer, progress }| Self { case: case.into(), answer, progress })
+    }
+
+    /// What an earlier run told, as it stands before the first search of this one.
+    pub fn taken_up(&self) -> Self {
+        let mut report = self.clone();
+        let progress = &mut report.progress;
+        (progress.state, progress.sentence) = match (&self.answer, progress.state) {
+            (None, _) => (State::Collecting, waiting_sentence(0)),
+            (Some(_), State::Failed) => (State::Searching, "All windows are searched again.".into()),
+            (Some(_), _) => (
+                State::Searching,
+                format!("{} So it was before the start; all windows are searched again.", progress.sentence),
+            ),
+        };
+        report
     }
 
     /// Whether readers who know another report learn something of this one.
     pub fn is_news_after(&self, told: Option<&Self>) -> bool {
-        let said = |report: &Self| (report.progress.state, report.progress.revision.clone());
+        let said = |report: &Self| {
+            let progress = &report.progress;
+            (progress.state, progress.revision.clone(), progress.windows_beyond > 0)
+        };
         told.is_none_or(|told| said(told) != said(self) || told.answer != self.answer)
     }
 }
@@ -255,6 +269,11 @@ pub enum News {
         /// Why.
         sentence: String,
     },
+    /// Windows come that are beyond what they are compared with.
+    Beyond {
+        /// How many, and beyond what.
+        sentence: String,
+    },
 }
 
 /// What changed from the report told `before` to the one `after`.
@@ -274,6 +293,10 @@ pub fn news(before: Option<&Report>, after: &Report) -> Vec<News> {
         (name, Some(clock_s)) if *name != is.name => news.push(News::Name { clock_s, name: is.name.clone() }),
         (name, None) if !name.is_empty() => news.push(News::NameWithdrawn { clock_s: at_s, name: name.clone() }),
         _ => {}
+    }
+    let were_beyond = before.is_some_and(|report| report.progress.windows_beyond > 0);
+    if after.progress.windows_beyond > 0 && after.progress.state != State::Refused && !were_beyond {
+        news.push(News::Beyond { sentence: after.progress.sentence.clone() });
     }
     let was_refused = before.is_some_and(|report| report.progress.state == State::Refused);
     if after.progress.state == State::Refused && !was_refused {
@@ -311,6 +334,16 @@ pub(super) fn waiting_sentence(windows: usize) -> String {
         true => format!("{windows} usable windows so far; {WINDOWS_MIN} are needed before anything can be said."),
         false => format!("{windows} usable windows so far, and nothing can be said before the first search."),
     }
+}
+
+/// What a report says beside all else where some windows are not compared.
+pub(super) fn beyond_sentence(seen: &Seen, [first_s, last_s]: [f64; 2]) -> String {
+    let Seen { windows, beyond, .. } = seen;
+    format!(
+        " {beyond} of {} usable windows are not compared: simulation, ancillary data and case have clock {first_s:.0} to {last_s:.0} s in \
+         common, and these are beyond.",
+        windows + beyond
+    )
 }
 
 impl Serialize for Report {
@@ -436,7 +469,12 @@ mod tests {
         let texts = reports.clone().map(|report| serde_json::to_string(&report).unwrap());
         let kept = Report::kept("leak", 7, &texts).unwrap();
         assert_eq!(kept.answer, reports[3].answer);
-        assert_eq!(kept.progress.state, State::Searching, "all is searched again");
+        let taken_up = kept.taken_up();
+        assert_eq!(
+            (taken_up.progress.state, &taken_up.answer),
+            (State::Searching, &kept.answer),
+            "all is searched again"
+        );
         assert_eq!(kept.progress.milestones, reports[3].progress.milestones);
         let looks: Vec<_> = kept.progress.looks.iter().map(|look| (look.last_clock_s, look.verdict)).collect();
         assert_eq!(looks, [(100.0, Verdict::Consistent), (200.0, Verdict::Explained)]);
@@ -479,5 +517,13 @@ mod tests {
         let mut later = refused.clone();
         later.progress.sentence = "The same with other numbers.".into();
         assert!(!later.is_news_after(Some(&refused)), "one refusal is told once");
+        let mut beyond = before.clone();
+        beyond.progress.windows_beyond = 1;
+        assert!(beyond.is_news_after(Some(&before)));
+        beyond.progress.windows_beyond = 2;
+        assert!(!beyond.is_news_after(Some(&Report {
+            progress: Progress { windows_beyond: 1, ..beyond.progress.clone() },
+            ..before
+        })));
     }
 }
