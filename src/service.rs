@@ -3,8 +3,10 @@
 pub mod diagnosing;
 mod http;
 
+use std::any::Any;
 use std::io;
 use std::net::SocketAddr;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, RwLock};
 use std::time::{Duration, Instant};
 
@@ -76,6 +78,8 @@ pub struct Service {
     pub station: SharedStation,
     drain: CancellationToken,
     give_up: CancellationToken,
+    /// Cancelled when nothing more can be taken, for good.
+    broken: CancellationToken,
     closing: CancellationToken,
     listening: JoinHandle<()>,
     writing: JoinHandle<Result<(), StoreError>>,
@@ -157,9 +161,15 @@ impl Service {
         board.enter(Phase::Running);
         let (drain, give_up) = (CancellationToken::new(), CancellationToken::new());
         let (parts_in, parts_out) = mpsc::channel(QUEUED_READS_MAX);
+        let broken = CancellationToken::new();
         let writing = {
             let (runtime, give_up) = (tokio::runtime::Handle::current(), give_up.clone());
-            in_background(PRODUCTS_GIVE_WAY, move || writer.run(&runtime, parts_out, &give_up))
+            let end = End { board: board.clone(), drain: drain.clone(), broken: broken.clone() };
+            in_background(PRODUCTS_GIVE_WAY, move || {
+                let written = catch_unwind(AssertUnwindSafe(|| writer.run(&runtime, parts_out, &give_up)));
+                end.tell(&written);
+                written.unwrap_or_else(|panic| resume_unwind(panic))
+            })
         };
         let diagnosing = diagnosis.map(|(expected, diagnosis)| {
             let stop = CancellationToken::new();
@@ -186,6 +196,7 @@ impl Service {
             station,
             drain,
             give_up,
+            broken,
             closing,
             listening,
             writing,
@@ -194,6 +205,11 @@ impl Service {
             diagnosing,
             drain_timeout,
         })
+    }
+
+    /// Waits until a part without which nothing can be taken has ended, though it was not asked to. What is left is to end.
+    pub async fn failed(&self) {
+        self.broken.cancelled().await;
     }
 
     /// Ends in order: no new connection, what is being sent is taken and made durable, recordings are finished, readers are told.
@@ -219,7 +235,7 @@ impl Service {
             give_up.cancel();
         });
         joined(self.listening.await)?;
-        let written = joined(self.writing.await)?;
+        let written = joined(self.writing.await).and_then(|written| Ok(written?));
         hurry.abort();
         let recorded = match self.recording {
             None => Ok(()),
@@ -236,6 +252,33 @@ impl Service {
         written?;
         recorded?;
         Ok(())
+    }
+}
+
+/// What the end of the writer is told to.
+struct End {
+    board: Arc<Board>,
+    drain: CancellationToken,
+    broken: CancellationToken,
+}
+
+impl End {
+    /// An end before the drain is a failure: whoever asks, reads the log or waits for it is told.
+    fn tell(&self, written: &Result<Result<(), StoreError>, Box<dyn Any + Send>>) {
+        if self.drain.is_cancelled() {
+            return;
+        }
+        let why = match written {
+            Ok(Ok(())) => "nothing sends to it any more".to_string(),
+            Ok(Err(error)) => error.to_string(),
+            Err(panic) => {
+                let said = panic.downcast_ref::<String>().map(String::as_str);
+                said.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("it panicked").to_string()
+            }
+        };
+        tracing::error!(why, "the writer ended before its time: nothing more is taken; what is durable is not lost");
+        self.board.enter(Phase::Stuck(format!("the writer ended: {why}")));
+        self.broken.cancel();
     }
 }
 
