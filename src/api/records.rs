@@ -15,7 +15,7 @@ use super::problem::Problem;
 use super::query::{Asked, optional_clock};
 use crate::hub::wire::{AnomalyWire, EventWire, Gap};
 use crate::pipeline::Station;
-use crate::pipeline::files::{ledger_json, version_json};
+use crate::pipeline::files::{known_json, ledger_json, version_json};
 
 /// When it was known.
 #[derive(Debug, Clone, Deserialize, IntoParams)]
@@ -34,15 +34,11 @@ async fn ask<T: Send + 'static>(app: &Arc<App>, question: impl FnOnce(&Station) 
 
 /// The calibration in use, or the one known at `as_of`.
 #[utoipa::path(get, path = "/calibration", tag = "calibration", params(AsOf),
-    responses((status = 200, description = "one version of the calibration", body = Object),
+    responses((status = 200, description = "one version of the calibration, with the ranges that were corrected as of then", body = Object),
         (status = 404, description = "none was known")))]
 pub async fn calibration(State(app): State<Arc<App>>, Asked(query): Asked<AsOf>) -> Result<Json<Value>, Problem> {
     let as_of = optional_clock(&app.mission, "as_of", query.as_of.as_deref())?;
-    let found = ask(&app, move |station| match as_of {
-        None => station.calibration().map(version_json),
-        Some(clock) => station.derived().as_of(clock).map(version_json),
-    })
-    .await;
+    let found = ask(&app, move |station| known_json(station, as_of)).await;
     found.map(Json).ok_or_else(|| Problem::not_found("no calibration is known, or was known then"))
 }
 

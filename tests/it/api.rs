@@ -146,6 +146,24 @@ async fn parameters_that_make_no_sense_are_named() {
     assert_eq!(running.get("/status?access_token=whatever").await["phase"], "running");
 }
 
+/// What was known is asked again with everything that products were made with.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_calibration_of_the_past_comes_with_the_ranges_corrected_then() {
+    let Some(folder) = shared_data("dumps") else { return };
+    let running = start().await;
+    running.send(&std::fs::read(folder.join("defects-24h.dump")).unwrap()).await;
+    running.wait_for_playbacks(1).await;
+    let now = running.get("/calibration").await;
+    let corrected = now["range_corrections"].as_array().unwrap();
+    assert!(!corrected.is_empty(), "{now:#}");
+    assert!(corrected.iter().all(|c| c["reported"] == "C" && c["actual"] == "A"), "{corrected:?}");
+    let latest = running.get("/status").await["ingest"]["latest_clock_s"].as_f64().unwrap();
+    assert_eq!(running.get(&format!("/calibration?as_of={latest}")).await, now);
+    let from_s = corrected[0]["from_clock_s"].as_f64().unwrap();
+    let before = running.get(&format!("/calibration?as_of={}", from_s - 100.0)).await;
+    assert_eq!(before["range_corrections"].as_array().map(Vec::len), Some(0), "{before:#}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn the_sample_comes_out_as_accelerations_with_errors_and_history_in_buckets() {
     let Some(folder) = shared_data("dumps") else { return };
