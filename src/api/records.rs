@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
+use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -116,11 +117,12 @@ pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
 /// What the simulation lacks: the running diagnosis with its progress, or, where none runs, the `diagnosis.json` that lies in the
 /// data directory.
 #[utoipa::path(get, path = "/diagnosis", tag = "diagnosis",
-    responses((status = 200, body = Object, description = "the members of diagnosis.json, verdict and false_alarm_probability null while there is no \
-        answer; of a running diagnosis also `progress`: state (collecting, searching, current, refused, failed), sentence, windows_seen, \
-        windows_beyond, windows_searched, first_clock_s, last_clock_s, revision, calibration, inputs, from_scratch, time_to_detect_s, time_to_name_s, counted_from (onset, first_data), counted_from_clock_s, searches, alarm_clock_s, \
-        name_clock_s, name, alarms_withdrawn, searches_failed, looks"),
-        (status = 404, description = "there is none")))]
+    responses((status = 200, body = Object, description = "the members of diagnosis.json, verdict and false_alarm_probability null while \
+        there is no answer; of a running diagnosis also `progress`: state (collecting, searching, current, refused, failed), sentence, \
+        windows_seen, windows_beyond, windows_searched, first_clock_s, last_clock_s, revision, calibration, inputs, at_rest, \
+        time_to_detect_s, time_to_name_s, counted_from (onset, logged_start, first_data), counted_from_clock_s, searches, alarm_clock_s, \
+        name_clock_s, name, alarm_came_at_once, name_came_at_once, alarms_withdrawn, searches_failed, looks"),
+        (status = 404, description = "there is none"), (status = 500, description = "the file that lies there is no JSON")))]
 pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Response, Problem> {
     if let Some(report) = app.desk.report() {
         return Ok(Json(&*report).into_response());
@@ -132,7 +134,8 @@ pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Response, Problem>
              CASE_DIR --out DATA/diagnosis.json`",
         )
     })?;
-    serde_json::from_slice::<Value>(&text)
-        .map(|value| Json(value).into_response())
-        .map_err(|error| Problem::not_found(format!("diagnosis.json in the data directory is no JSON: {error}")))
+    serde_json::from_slice::<Value>(&text).map(|value| Json(value).into_response()).map_err(|error| {
+        let detail = format!("diagnosis.json in the data directory is no JSON: {error}");
+        Problem::new(StatusCode::INTERNAL_SERVER_ERROR, detail)
+    })
 }

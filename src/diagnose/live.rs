@@ -15,10 +15,11 @@ use std::sync::Arc;
 
 pub use inputs::digest;
 pub use progress::{CountedFrom, Look, Milestones, News, Progress, Report, State, news};
-use progress::{add, beyond_sentence, digits, waiting_sentence};
+use progress::{Found, add, beyond_sentence, digits, waiting_sentence};
 
-use super::answer::{Diagnosis, Source};
+use super::answer::{Diagnosis, EffectAnswer, Source};
 use super::case::{Case, Expectation, HALF_WINDOW_S, Recording, WINDOW_STRIDE_S, WINDOWS_MIN};
+use super::catalogue;
 use super::error::CaseError;
 use super::noise::AxisNoise;
 use super::null_table;
@@ -30,6 +31,9 @@ use super::scene::{Scene, Surroundings};
 use super::solve::{Library, Stop, null_noise};
 use super::verdict::{self, Proof};
 use crate::math::shared_work;
+
+/// Windows that are so many times what is needed for a search came at once: how late a finding is, is then no matter of searches.
+const AT_ONCE: f64 = 2.0;
 
 /// When and how to look.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,7 +97,7 @@ impl Live {
             span_s: [first_s, last_s],
             revision: progress.revision,
             calibration: progress.calibration,
-            from_scratch: progress.from_scratch,
+            from_scratch: progress.at_rest,
         });
         Ok(Self {
             expected: Arc::new(expected),
@@ -182,7 +186,11 @@ impl Live {
         self.sentence = report::sentence(&diagnosis);
         let (verdict, last_clock_s) = (diagnosis.verdict, span_s[1]);
         let named: Vec<String> = diagnosis.effects.iter().map(|e| e.id.clone()).collect();
-        self.milestones.take(verdict, &named, last_clock_s, is_another);
+        let before = self.answer.as_ref().map_or(0, |answer| answer.windows);
+        let fresh_s = windows.saturating_sub(before) as f64 * WINDOW_STRIDE_S;
+        let due_s = self.policy.search_every_s.max(WINDOWS_MIN as f64 * WINDOW_STRIDE_S);
+        let came_at_once = fresh_s > AT_ONCE * due_s;
+        self.milestones.take(Found { verdict, named: &named, last_clock_s, is_another, came_at_once });
         add(&mut self.looks, Look { windows, last_clock_s, verdict, named, log_odds }, is_another);
         self.answer =
             Some(Answer { diagnosis, windows, span_s, revision, calibration: seen.calibration, from_scratch });
@@ -207,11 +215,9 @@ impl Live {
     pub fn report(&self, seen: &Seen, is_searching: bool) -> Report {
         let windows_seen = seen.windows + seen.beyond;
         let answer = self.answer.as_ref();
-        let effects = answer.map_or(&[][..], |answer| &answer.diagnosis.effects);
-        let onsets: Vec<f64> = effects.iter().filter_map(|e| e.parameter("onset_s")).collect();
-        let by_onset = !onsets.is_empty() && onsets.len() == effects.len();
-        let first = answer.map(|answer| answer.span_s[0]);
-        let from = if by_onset { onsets.into_iter().reduce(f64::min) } else { first };
+        let (counted_from, from) = answer.map_or((CountedFrom::FirstData, None), |answer| {
+            began(&self.expected, &answer.diagnosis.effects, answer.span_s[0])
+        });
         let since = |clock_s: Option<f64>| Some((clock_s? - from?).max(0.0));
         let mut sentence = match self.state {
             State::Collecting => waiting_sentence(seen.windows),
@@ -220,27 +226,47 @@ impl Live {
         if seen.beyond > 0 && self.state != State::Refused {
             sentence.push_str(&beyond_sentence(seen, self.span_s()));
         }
+        let is_whole = |answer: &Answer| answer.from_scratch && answer.revision == digits(seen.digest);
+        let at_rest = !is_searching && self.state == State::Current && answer.is_some_and(is_whole);
         let progress = Progress {
             state: if is_searching { State::Searching } else { self.state },
             sentence,
             windows_seen,
             windows_beyond: seen.beyond,
             windows_searched: answer.map_or(0, |answer| answer.windows),
-            first_clock_s: first,
+            first_clock_s: answer.map(|answer| answer.span_s[0]),
             last_clock_s: answer.map(|answer| answer.span_s[1]),
             revision: answer.map_or(digits(0), |answer| answer.revision.clone()),
             calibration: answer.map_or(0, |answer| answer.calibration),
             inputs: digits(self.inputs),
-            from_scratch: answer.is_some_and(|answer| answer.from_scratch),
+            at_rest,
             time_to_detect_s: since(self.milestones.alarm_clock_s),
             time_to_name_s: since(self.milestones.name_clock_s),
-            counted_from: if by_onset { CountedFrom::Onset } else { CountedFrom::FirstData },
+            counted_from,
             counted_from_clock_s: from,
             milestones: self.milestones.clone(),
             looks: self.looks.clone(),
         };
         let case = self.expected.header.id.clone();
         Report { case, answer: answer.map(|answer| answer.diagnosis.clone()), progress }
+    }
+}
+
+/// Since when what an answer names was there to be found, and what says so.
+fn began(expected: &Expectation, effects: &[EffectAnswer], first_s: f64) -> (CountedFrom, Option<f64>) {
+    let onset = |e: &EffectAnswer| e.parameter("onset_s").map(|at| (CountedFrom::Onset, at));
+    let logged = |e: &EffectAnswer| {
+        let spans = expected.spans(catalogue::logged_kind(&e.id)?);
+        let starts = spans.iter().filter(|span| span[1] >= first_s).map(|span| span[0].max(first_s));
+        starts.reduce(f64::min).map(|at| (CountedFrom::LoggedStart, at))
+    };
+    let began: Vec<_> = effects.iter().filter_map(|e| onset(e).or_else(|| logged(e))).collect();
+    match began.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
+        Some((_, at)) if began.len() == effects.len() => {
+            let all_logged = began.iter().all(|(by, _)| *by == CountedFrom::LoggedStart);
+            (if all_logged { CountedFrom::LoggedStart } else { CountedFrom::Onset }, Some(*at))
+        }
+        _ => (CountedFrom::FirstData, Some(first_s)),
     }
 }
 
@@ -258,6 +284,43 @@ fn chances_at(look: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::answer::ParameterAnswer;
+    use crate::diagnose::case::Event;
+
+    #[test]
+    fn times_count_from_an_onset_or_a_start_in_the_log_where_every_effect_has_one() {
+        let expected = inputs::tests::expected(|e| {
+            let dump = |clock_s| Event { clock_s, duration_s: 100.0, kind: "water_dump".into(), detail: String::new() };
+            e.events = [50.0, 950.0, 5000.0].map(dump).into();
+        });
+        let effect = |id: &str, onset_s: Option<f64>| EffectAnswer {
+            id: id.into(),
+            name: id.into(),
+            posterior: 1.0,
+            parameters: onset_s
+                .map(|value| ParameterAnswer { name: "onset_s".into(), value, sigma: 1.0, unit: "s".into() })
+                .into_iter()
+                .collect(),
+            axis: None,
+            why: String::new(),
+            rms_ng: None,
+        };
+        let (dump, leak, offset) =
+            (effect("water_dump", None), effect("vent_leak", Some(3000.0)), effect("cg_offset", None));
+        let of = |effects: &[&EffectAnswer], first_s| {
+            began(&expected, &effects.iter().copied().cloned().collect::<Vec<_>>(), first_s)
+        };
+        assert_eq!(of(&[&dump], 200.0), (CountedFrom::LoggedStart, Some(950.0)), "the first that is recorded");
+        assert_eq!(
+            of(&[&dump], 1000.0),
+            (CountedFrom::LoggedStart, Some(1000.0)),
+            "one under way, from the first window"
+        );
+        assert_eq!(of(&[&leak], 0.0), (CountedFrom::Onset, Some(3000.0)));
+        assert_eq!(of(&[&leak, &dump], 2000.0), (CountedFrom::Onset, Some(3000.0)));
+        assert_eq!(of(&[&dump, &offset], 200.0), (CountedFrom::FirstData, Some(200.0)), "one of them was always there");
+        assert_eq!(of(&[], 200.0), (CountedFrom::FirstData, Some(200.0)));
+    }
 
     #[test]
     fn what_remains_may_be_chanced_at_any_of_many_looks_no_oftener_than_once() {

@@ -8,6 +8,7 @@ use std::sync::{Arc, Condvar, Mutex, OnceLock};
 use std::time::Instant;
 
 use oare_ground::config::Config;
+use oare_ground::diagnose::{self, recorder};
 use oare_ground::ingest::wire::LinkConfig;
 use oare_ground::math::shared_work;
 use oare_ground::physics::Vec3;
@@ -91,20 +92,15 @@ impl Running {
         value.unwrap_or_else(|| panic!("{name} is not in: {text}"))
     }
 
-    /// Waits until every window known is in the answer.
+    /// Waits until every usable window that the station has is in the answer, more than so many.
     async fn settled(&self, windows_min: u64) -> Value {
-        let all = |d: &Value| {
-            let p = &d["progress"];
-            p["state"] == "current" && p["windows_searched"].as_u64() > Some(windows_min) && p["from_scratch"] == true
+        let is_whole = |d: &Value| {
+            let (p, there) =
+                (&d["progress"], recorder::seen(&self.service.station.read().unwrap(), recorder::ALL_TIME));
+            let is_known = p["windows_seen"] == there.windows && p["windows_searched"].as_u64() > Some(windows_min);
+            is_known && p["at_rest"] == true
         };
-        let known = self.wait_for_diagnosis("an answer", all).await;
-        // The windows after the last calibration come with the flush; what comes later is looked at when it is quiet.
-        let seen = known["progress"]["windows_seen"].as_u64().unwrap();
-        self.wait_for_diagnosis("an answer to all windows", |d| {
-            let p = &d["progress"];
-            p["state"] == "current" && p["windows_seen"].as_u64() >= Some(seen) && p["from_scratch"] == true
-        })
-        .await
+        self.wait_for_diagnosis("an answer to all windows", is_whole).await
     }
 }
 
@@ -215,6 +211,17 @@ async fn at_rest_the_answer_is_the_same_whatever_came_before() {
         running.service.drain().await.unwrap();
     }
     assert_eq!(answers[0], answers[1]);
+    // It is that of `oare diagnose`, but for the level of proof.
+    let file = |name: &str| {
+        let text = mission().1.iter().find(|(file, _)| *file == name).map(|(_, text)| text.clone().into_bytes());
+        Ok(text.or_else(|| (name == "recording.dump").then(|| [&first[..], second].concat())))
+    };
+    let case = recorder::case(file, &[]).unwrap();
+    let alone = serde_json::to_value(diagnose::diagnose(&case, &diagnose::Settings::default()).unwrap()).unwrap();
+    let answer: Value = serde_json::from_str(&answers[0]).unwrap();
+    for same in ["case", "verdict", "statistic", "effects", "located", "fit", "upper_limits"] {
+        assert_eq!(answer[same], alone[same], "{same}");
+    }
 }
 
 /// Nobody believes that windows are watched which the simulation does not reach, and those it reaches are not searched for them again.
@@ -385,4 +392,26 @@ fn what_is_wrong_with_the_diagnosis_is_told_whole_with_exit_code_2() {
     ] {
         assert!(contents.contains(word), "{word} is not in: {contents}");
     }
+    // Simulation and ancillary data alone: whatever is missing of the vehicle is told at once, and what is there is enough.
+    write_case(dir.path());
+    let files = "[diagnosis]\nsimulation = \"simulation.csv\"\nancillary = \"ancillary.csv\"\n";
+    let alone = told(files);
+    for word in ["4 faults", "diagnosis.set", "vehicle.mass_kg", "drag_coefficient", "area_m2", "sensor_offset_m"] {
+        assert!(alone.contains(word), "{word} is not in: {alone}");
+    }
+    let vehicle = "\"vehicle.mass_kg=104500\", \"vehicle.drag_coefficient=2.2\", \"vehicle.area_m2=[64.1, 255.0, 367.0]\", \
+                   \"vehicle.sensor_offset_m=[-1.5, 0.1, 0.6]\"";
+    let config = Config::from_toml_in(&format!("{files}set = [{vehicle}]\n"), dir.path()).unwrap();
+    config.diagnosis.unwrap().expectation(&config.settings.time).unwrap();
+    // Each sentence names what the operator wrote.
+    for (set, word) in
+        [("vehicle.mass_kg", "key=value"), ("vehicle.mas_kg=5", "vehicle.mas_kg"), ("vehicle.mass_kg=-5", "positive")]
+    {
+        let said = told(&format!("[diagnosis]\ncase = \".\"\nset = [\"{set}\"]\n"));
+        assert!(said.contains("diagnosis.set") && said.contains(word), "{said}");
+    }
+    let csv = told("[diagnosis]\ncase = \"simulation.csv\"\n");
+    assert!(csv.contains("simulation.csv: ") && !csv.contains("case.toml"), "{csv}");
+    let orbits = told("[diagnosis]\ncase = \".\"\nset = [\"recording.kind=orbit_sp3\"]\n");
+    assert!(orbits.contains("1 fault") && orbits.contains("orbit_sp3"), "{orbits}");
 }

@@ -52,11 +52,12 @@ pub fn digest(expected: &Expectation, policy: &Policy) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::diagnose::case::{Ancillary, Event, Header, Simulation};
 
-    fn expected(change: impl FnOnce(&mut Expectation)) -> Expectation {
+    /// An expectation of two rows.
+    pub(in crate::diagnose::live) fn expected(change: impl FnOnce(&mut Expectation)) -> Expectation {
         let text = "[case]\nid = \"a\"\nepoch_utc = \"1994-07-08T12:53:01Z\"\n[recording]\nkind = \"series_csv\"\n";
         let mut expected = Expectation {
             header: Header::parse(text, &[]).unwrap(),

@@ -35,6 +35,12 @@ pub struct Milestones {
     pub name_clock_s: Option<f64>,
     /// The name that stands; empty where there is none.
     pub name: Vec<String>,
+    /// The windows of the look that raised the alarm came down at once, many searches' worth: the time to detect is the playback's.
+    #[serde(default)]
+    pub alarm_came_at_once: bool,
+    /// The same of the look that gave the name.
+    #[serde(default)]
+    pub name_came_at_once: bool,
     /// Alarms that a later look took back.
     pub alarms_withdrawn: u64,
     /// Looks that failed, by a defect of the program.
@@ -43,23 +49,39 @@ pub struct Milestones {
 }
 
 impl Milestones {
-    /// Takes the verdict of a look; one at other windows than the look before is one more.
-    pub(super) fn take(&mut self, verdict: Verdict, named: &[String], last_clock_s: f64, is_another: bool) {
+    /// Takes what a look found.
+    pub(super) fn take(&mut self, found: Found<'_>) {
+        let Found { verdict, named, last_clock_s, is_another, came_at_once } = found;
         self.searches += u64::from(is_another);
         if verdict == Verdict::Consistent {
             self.alarms_withdrawn += u64::from(self.alarm_clock_s.is_some());
             self.alarm_clock_s = None;
-        } else {
-            self.alarm_clock_s.get_or_insert(last_clock_s);
+            self.alarm_came_at_once = false;
+        } else if self.alarm_clock_s.is_none() {
+            self.alarm_clock_s = Some(last_clock_s);
+            self.alarm_came_at_once = came_at_once;
         }
         // One name is one set, told without a rival.
         let mut name = if verdict == Verdict::Explained { named.to_vec() } else { Vec::new() };
         name.sort_unstable();
         if name != self.name {
             self.name_clock_s = (!name.is_empty()).then_some(last_clock_s);
+            self.name_came_at_once = came_at_once && !name.is_empty();
             self.name = name;
         }
     }
+}
+
+/// What a look found, and of which windows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Found<'a> {
+    pub(super) verdict: Verdict,
+    pub(super) named: &'a [String],
+    pub(super) last_clock_s: f64,
+    /// Not the windows of the look before once more.
+    pub(super) is_another: bool,
+    /// Many searches' worth of windows was new.
+    pub(super) came_at_once: bool,
 }
 
 /// Where the running diagnosis is.
@@ -98,8 +120,10 @@ impl State {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CountedFrom {
-    /// The onset that every effect named has.
+    /// The earliest onset, where every effect named has one: its own or in the log.
     Onset,
+    /// The earliest start in the log, where every effect named lasts as long as its entries do.
+    LoggedStart,
     /// The first window.
     FirstData,
 }
@@ -128,10 +152,10 @@ pub struct Progress {
     pub calibration: u32,
     /// Digest of what the windows are compared with: simulation, ancillary data, log, case and claim.
     pub inputs: String,
-    /// Whether the answer is that of these windows alone, as `oare diagnose` has it, and does not start from a look before: so it is
-    /// as soon as nothing more comes.
-    pub from_scratch: bool,
-    /// Recording seconds from the effect's onset (or the first data) to the last window of the look that raised the alarm.
+    /// Whether the answer rests on every window seen that can be compared, and on nothing else: it is then that of `oare diagnose`, whatever
+    /// came before. So it is as soon as nothing more comes.
+    pub at_rest: bool,
+    /// Recording seconds from the effect's onset, its logged start or the first data to the last window of the look that raised the alarm.
     pub time_to_detect_s: Option<f64>,
     /// The same to the look that gave the name that stands.
     pub time_to_name_s: Option<f64>,
@@ -181,7 +205,7 @@ impl Report {
             revision: digits(0),
             calibration: 0,
             inputs: digits(inputs),
-            from_scratch: false,
+            at_rest: false,
             time_to_detect_s: None,
             time_to_name_s: None,
             counted_from: CountedFrom::FirstData,
@@ -414,21 +438,42 @@ mod tests {
         names.iter().map(|name| name.to_string()).collect()
     }
 
+    fn take(m: &mut Milestones, verdict: Verdict, names: &[&str], last_clock_s: f64, is_another: bool) {
+        m.take(Found { verdict, named: &named(names), last_clock_s, is_another, came_at_once: false });
+    }
+
+    #[test]
+    fn what_came_at_once_is_marked_as_long_as_it_stands() {
+        let mut m = Milestones::default();
+        let found = |verdict, last_clock_s, came_at_once| Found {
+            verdict,
+            named: &[],
+            last_clock_s,
+            is_another: true,
+            came_at_once,
+        };
+        m.take(found(Verdict::Unexplained, 100.0, true));
+        m.take(found(Verdict::Unexplained, 200.0, false));
+        assert!(m.alarm_came_at_once && !m.name_came_at_once);
+        m.take(found(Verdict::Consistent, 300.0, true));
+        assert!(!m.alarm_came_at_once);
+    }
+
     #[test]
     fn an_alarm_and_a_name_count_from_the_first_look_of_an_unbroken_run() {
         let mut m = Milestones::default();
-        m.take(Verdict::Consistent, &[], 100.0, true);
-        m.take(Verdict::Unexplained, &[], 200.0, true);
-        m.take(Verdict::Explained, &named(&["vent_leak"]), 300.0, true);
-        m.take(Verdict::Explained, &named(&["vent_leak"]), 400.0, true);
-        m.take(Verdict::Explained, &named(&["vent_leak"]), 400.0, false);
+        take(&mut m, Verdict::Consistent, &[], 100.0, true);
+        take(&mut m, Verdict::Unexplained, &[], 200.0, true);
+        take(&mut m, Verdict::Explained, &["vent_leak"], 300.0, true);
+        take(&mut m, Verdict::Explained, &["vent_leak"], 400.0, true);
+        take(&mut m, Verdict::Explained, &["vent_leak"], 400.0, false);
         assert_eq!((m.alarm_clock_s, m.name_clock_s, m.alarms_withdrawn), (Some(200.0), Some(300.0), 0));
-        m.take(Verdict::Ambiguous, &named(&["vent_leak"]), 500.0, true);
+        take(&mut m, Verdict::Ambiguous, &["vent_leak"], 500.0, true);
         assert_eq!((m.alarm_clock_s, m.name_clock_s), (Some(200.0), None), "a set with a rival is no name");
-        m.take(Verdict::Explained, &named(&["water_dump", "vent_leak"]), 600.0, true);
-        m.take(Verdict::Explained, &named(&["vent_leak", "water_dump"]), 700.0, true);
+        take(&mut m, Verdict::Explained, &["water_dump", "vent_leak"], 600.0, true);
+        take(&mut m, Verdict::Explained, &["vent_leak", "water_dump"], 700.0, true);
         assert_eq!(m.name_clock_s, Some(600.0), "the order of names is no difference");
-        m.take(Verdict::Consistent, &[], 800.0, true);
+        take(&mut m, Verdict::Consistent, &[], 800.0, true);
         assert_eq!((m.alarm_clock_s, m.name_clock_s, m.alarms_withdrawn, m.searches), (None, None, 1, 8));
     }
 
@@ -439,7 +484,7 @@ mod tests {
         let progress = &mut report.progress;
         (progress.state, progress.last_clock_s) = (State::Current, Some(clock_s));
         progress.milestones.searches = n - 1;
-        progress.milestones.take(verdict, &[], clock_s, true);
+        take(&mut progress.milestones, verdict, &[], clock_s, true);
         let windows = 200 + n as usize;
         progress.looks = vec![Look { windows, last_clock_s: clock_s, verdict, named: vec![], log_odds: 1.0 }];
         Report { answer: Some(diagnosis), ..report }
@@ -491,11 +536,11 @@ mod tests {
         assert_eq!(news(Some(&silent), &alarm), [raised]);
         assert_eq!(news(Some(&alarm), &alarm), []);
         let before = alarm.clone();
-        alarm.progress.milestones.take(Verdict::Explained, &named(&["vent_leak"]), 300.0, true);
+        take(&mut alarm.progress.milestones, Verdict::Explained, &["vent_leak"], 300.0, true);
         alarm.progress.last_clock_s = Some(300.0);
         assert_eq!(news(Some(&before), &alarm), [News::Name { clock_s: 300.0, name: named(&["vent_leak"]) }]);
         let mut gone = alarm.clone();
-        gone.progress.milestones.take(Verdict::Consistent, &[], 400.0, true);
+        take(&mut gone.progress.milestones, Verdict::Consistent, &[], 400.0, true);
         gone.progress.last_clock_s = Some(400.0);
         let name = named(&["vent_leak"]);
         let withdrawn = [News::AlarmWithdrawn { clock_s: 400.0 }, News::NameWithdrawn { clock_s: 400.0, name }];
