@@ -200,8 +200,13 @@ fn log(hub: &Hub, news: &[News]) {
             News::Refused { sentence } => {
                 tracing::warn!(mission, spacecraft, sentence, "diagnosis: refused");
             }
-            News::Beyond { sentence } => {
-                tracing::warn!(mission, spacecraft, sentence, "diagnosis: windows come that are not compared");
+            News::Beyond { windows } => {
+                tracing::warn!(
+                    mission,
+                    spacecraft,
+                    windows,
+                    "diagnosis: windows come that are beyond what they are compared with"
+                );
             }
         }
     }

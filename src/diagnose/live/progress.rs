@@ -295,8 +295,8 @@ pub enum News {
     },
     /// Windows come that are beyond what they are compared with.
     Beyond {
-        /// How many, and beyond what.
-        sentence: String,
+        /// How many so far.
+        windows: usize,
     },
 }
 
@@ -320,7 +320,7 @@ pub fn news(before: Option<&Report>, after: &Report) -> Vec<News> {
     }
     let were_beyond = before.is_some_and(|report| report.progress.windows_beyond > 0);
     if after.progress.windows_beyond > 0 && after.progress.state != State::Refused && !were_beyond {
-        news.push(News::Beyond { sentence: after.progress.sentence.clone() });
+        news.push(News::Beyond { windows: after.progress.windows_beyond });
     }
     let was_refused = before.is_some_and(|report| report.progress.state == State::Refused);
     if after.progress.state == State::Refused && !was_refused {
@@ -549,6 +549,10 @@ mod tests {
         (refused.progress.state, refused.progress.sentence) = (State::Refused, "No window is in common.".into());
         assert_eq!(news(Some(&alarm), &refused), [News::Refused { sentence: "No window is in common.".into() }]);
         assert_eq!(news(Some(&refused), &refused), []);
+        let mut beyond = alarm.clone();
+        beyond.progress.windows_beyond = 3;
+        assert_eq!(news(Some(&alarm), &beyond), [News::Beyond { windows: 3 }]);
+        assert_eq!(news(Some(&beyond), &beyond), []);
     }
 
     #[test]
