@@ -234,15 +234,6 @@ impl Hub {
         self.head.subscribe()
     }
 
-    /// The JSON members of the last message on a topic that is told whole.
-    pub fn last_told(&self, wanted: Topic) -> Option<String> {
-        let state = self.state.read().expect("no holder panics");
-        state.journal.iter().rev().find_map(|entry| match &**entry {
-            Entry::Told { topic, json, .. } if *topic == wanted => Some(json.clone()),
-            _ => None,
-        })
-    }
-
     /// The revision of a window that was told last.
     pub fn told_revision(&self, start: Clock) -> Option<Revision> {
         let state = self.state.read().expect("no holder panics");

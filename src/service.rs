@@ -3,8 +3,10 @@
 pub mod diagnosing;
 mod http;
 
+use std::any::Any;
 use std::io;
 use std::net::SocketAddr;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, RwLock};
 use std::time::{Duration, Instant};
 
@@ -16,7 +18,7 @@ use tokio_util::sync::{CancellationToken, DropGuard};
 use crate::api::{self, App, Metrics};
 use crate::config::{Config, ConfigFaults};
 use crate::diagnose::case::Expectation;
-use crate::diagnose::live::Report;
+use crate::diagnose::live::{Report, digest};
 use crate::hub::Hub;
 use crate::hub::desk::Desk;
 use crate::hub::status::{Board, Phase};
@@ -76,6 +78,8 @@ pub struct Service {
     pub station: SharedStation,
     drain: CancellationToken,
     give_up: CancellationToken,
+    /// Cancelled when nothing more can be taken, for good.
+    broken: CancellationToken,
     closing: CancellationToken,
     listening: JoinHandle<()>,
     writing: JoinHandle<Result<(), StoreError>>,
@@ -118,9 +122,18 @@ impl Service {
         let hub = Arc::new(Hub::new(&settings.mission, settings.link.spacecraft_id, queue, samples));
         let board = Arc::new(Board::default());
         let desk = Arc::new(Desk::default());
-        if let Some(expected) = &expected {
-            desk.show(Report::waiting(&expected.header.id));
-        }
+        // Read before anybody is answered: what was found before the start is there from the first answer on.
+        let journal = {
+            let log = log.clone();
+            blocking(move || log.journal()).await??
+        };
+        let diagnosis = expected.zip(config.diagnosis.as_ref());
+        let earlier = diagnosis.as_ref().and_then(|(expected, diagnosis)| {
+            let earlier = diagnosing::earlier(&journal.entries, expected, &diagnosis.policy);
+            let waiting = || Report::waiting(&expected.header.id, digest(expected, &diagnosis.policy));
+            desk.show(earlier.as_ref().map_or_else(waiting, Report::taken_up));
+            earlier
+        });
         let closing = CancellationToken::new();
         let app = Arc::new(App {
             hub: hub.clone(),
@@ -139,7 +152,7 @@ impl Service {
         let serving = tokio::spawn(http::serve(http, api::router(app), closing.clone()));
         let writer = {
             let (log, station, hub, board) = (log.clone(), station.clone(), hub.clone(), board.clone());
-            blocking(move || Writer::restore(log, station, hub, board)).await??
+            blocking(move || Writer::restore(log, journal, station, hub, board)).await??
         };
         let recording = match config.recording {
             false => None,
@@ -148,14 +161,20 @@ impl Service {
         board.enter(Phase::Running);
         let (drain, give_up) = (CancellationToken::new(), CancellationToken::new());
         let (parts_in, parts_out) = mpsc::channel(QUEUED_READS_MAX);
+        let broken = CancellationToken::new();
         let writing = {
             let (runtime, give_up) = (tokio::runtime::Handle::current(), give_up.clone());
-            in_background(PRODUCTS_GIVE_WAY, move || writer.run(&runtime, parts_out, &give_up))
+            let end = End { board: board.clone(), drain: drain.clone(), broken: broken.clone() };
+            in_background(PRODUCTS_GIVE_WAY, move || {
+                let written = catch_unwind(AssertUnwindSafe(|| writer.run(&runtime, parts_out, &give_up)));
+                end.tell(&written);
+                written.unwrap_or_else(|panic| resume_unwind(panic))
+            })
         };
-        let diagnosing = expected.zip(config.diagnosis.as_ref()).map(|(expected, diagnosis)| {
+        let diagnosing = diagnosis.map(|(expected, diagnosis)| {
             let stop = CancellationToken::new();
             let (station, hub, policy) = (station.clone(), hub.clone(), diagnosis.policy.clone());
-            let work = Diagnosing { station, hub, desk, expected, policy, gate, stop: stop.clone() };
+            let work = Diagnosing { station, hub, desk, expected, policy, earlier, gate, stop: stop.clone() };
             let runtime = tokio::runtime::Handle::current();
             (stop.drop_guard(), in_background(SEARCHES_GIVE_WAY, move || work.run(&runtime)))
         });
@@ -177,6 +196,7 @@ impl Service {
             station,
             drain,
             give_up,
+            broken,
             closing,
             listening,
             writing,
@@ -185,6 +205,11 @@ impl Service {
             diagnosing,
             drain_timeout,
         })
+    }
+
+    /// Waits until a part without which nothing can be taken has ended, though it was not asked to. What is left is to end.
+    pub async fn failed(&self) {
+        self.broken.cancelled().await;
     }
 
     /// Ends in order: no new connection, what is being sent is taken and made durable, recordings are finished, readers are told.
@@ -210,7 +235,7 @@ impl Service {
             give_up.cancel();
         });
         joined(self.listening.await)?;
-        let written = joined(self.writing.await)?;
+        let written = joined(self.writing.await).and_then(|written| Ok(written?));
         hurry.abort();
         let recorded = match self.recording {
             None => Ok(()),
@@ -227,6 +252,33 @@ impl Service {
         written?;
         recorded?;
         Ok(())
+    }
+}
+
+/// What the end of the writer is told to.
+struct End {
+    board: Arc<Board>,
+    drain: CancellationToken,
+    broken: CancellationToken,
+}
+
+impl End {
+    /// An end before the drain is a failure: whoever asks, reads the log or waits for it is told.
+    fn tell(&self, written: &Result<Result<(), StoreError>, Box<dyn Any + Send>>) {
+        if self.drain.is_cancelled() {
+            return;
+        }
+        let why = match written {
+            Ok(Ok(())) => "nothing sends to it any more".to_string(),
+            Ok(Err(error)) => error.to_string(),
+            Err(panic) => {
+                let said = panic.downcast_ref::<String>().map(String::as_str);
+                said.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("it panicked").to_string()
+            }
+        };
+        tracing::error!(why, "the writer ended before its time: nothing more is taken; what is durable is not lost");
+        self.board.enter(Phase::Stuck(format!("the writer ended: {why}")));
+        self.broken.cancel();
     }
 }
 
@@ -265,11 +317,15 @@ fn in_background<T: Send + 'static>(niceness: i32, work: impl FnOnce() -> T + Se
     })
 }
 
+/// All processors but one, which is left to those who answer.
+fn others() -> usize {
+    std::thread::available_parallelism().map_or(1, |processors| processors.get().saturating_sub(1).max(1))
+}
+
 /// The threads that share the work of a calibration give way too, and leave one processor to those who answer. A pool that the process
 /// has already stays as it is.
 fn shared_work_gives_way() {
-    let others = std::thread::available_parallelism().map_or(1, |processors| processors.get().saturating_sub(1).max(1));
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(others).start_handler(|_| give_way(PRODUCTS_GIVE_WAY));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(others()).start_handler(|_| give_way(PRODUCTS_GIVE_WAY));
     if let Err(error) = pool.build_global() {
         tracing::debug!(%error, "the threads of shared work keep their priority");
     }

@@ -7,6 +7,7 @@ mod accel;
 mod dashboard;
 mod guard;
 mod live;
+mod parameters;
 mod problem;
 mod query;
 mod records;
@@ -31,6 +32,7 @@ use crate::hub::desk::Desk;
 use crate::hub::status::Board;
 use crate::ingest::writer::SharedStation;
 use crate::units::MissionTime;
+use parameters::Parameters;
 use problem::Problem;
 pub use status::Metrics;
 
@@ -66,6 +68,7 @@ pub struct App {
 pub fn router(app: Arc<App>) -> Router {
     let (router, openapi) = documented().with_state(app.clone()).split_for_parts();
     let openapi = Arc::new(described(openapi));
+    let parameters = Arc::new(Parameters::of(&openapi));
     router
         .route("/openapi.json", get(move || async move { Json(OpenApi::clone(&openapi)) }))
         .merge(dashboard::routes())
@@ -74,6 +77,7 @@ pub fn router(app: Arc<App>) -> Router {
             let detail = format!("{} does not take {method}; GET", uri.path());
             Problem::new(StatusCode::METHOD_NOT_ALLOWED, detail)
         })
+        .layer(middleware::from_fn_with_state(parameters, parameters::check))
         .layer(middleware::from_fn_with_state(app, guard::guard))
 }
 
@@ -112,9 +116,8 @@ fn described(openapi: OpenApi) -> OpenApi {
 
 /// The problems that any route of its kind may answer with.
 fn describe_problems(path: &str, operation: &mut Operation) {
-    let parameters = operation.parameters.as_ref().is_some_and(|parameters| !parameters.is_empty());
     let problems = [
-        ("400", "a parameter makes no sense", parameters),
+        ("400", "a parameter makes no sense, is given twice, or is none of this route", true),
         ("401", "the service has a token, and the request does not", !guard::OPEN_PATHS.contains(&path)),
         ("414", "path and query are too long", true),
     ];

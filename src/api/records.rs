@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
+use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -15,7 +16,7 @@ use super::problem::Problem;
 use super::query::{Asked, optional_clock};
 use crate::hub::wire::{AnomalyWire, EventWire, Gap};
 use crate::pipeline::Station;
-use crate::pipeline::files::{ledger_json, version_json};
+use crate::pipeline::files::{known_json, ledger_json, version_json};
 
 /// When it was known.
 #[derive(Debug, Clone, Deserialize, IntoParams)]
@@ -34,15 +35,11 @@ async fn ask<T: Send + 'static>(app: &Arc<App>, question: impl FnOnce(&Station) 
 
 /// The calibration in use, or the one known at `as_of`.
 #[utoipa::path(get, path = "/calibration", tag = "calibration", params(AsOf),
-    responses((status = 200, description = "one version of the calibration", body = Object),
+    responses((status = 200, description = "one version of the calibration, with the ranges that were corrected as of then", body = Object),
         (status = 404, description = "none was known")))]
 pub async fn calibration(State(app): State<Arc<App>>, Asked(query): Asked<AsOf>) -> Result<Json<Value>, Problem> {
     let as_of = optional_clock(&app.mission, "as_of", query.as_of.as_deref())?;
-    let found = ask(&app, move |station| match as_of {
-        None => station.calibration().map(version_json),
-        Some(clock) => station.derived().as_of(clock).map(version_json),
-    })
-    .await;
+    let found = ask(&app, move |station| known_json(station, as_of)).await;
     found.map(Json).ok_or_else(|| Problem::not_found("no calibration is known, or was known then"))
 }
 
@@ -120,11 +117,12 @@ pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
 /// What the simulation lacks: the running diagnosis with its progress, or, where none runs, the `diagnosis.json` that lies in the
 /// data directory.
 #[utoipa::path(get, path = "/diagnosis", tag = "diagnosis",
-    responses((status = 200, body = Object, description = "the members of diagnosis.json; of a running diagnosis also `progress`: state \
-        (collecting, searching, current, refused, failed), sentence, windows_seen, windows_searched, first_clock_s, last_clock_s, revision, \
-        calibration, time_to_detect_s, time_to_name_s, counted_from (onset, first_data), counted_from_clock_s, searches, alarm_clock_s, \
-        name_clock_s, name, alarms_withdrawn, searches_failed, looks"),
-        (status = 404, description = "there is none")))]
+    responses((status = 200, body = Object, description = "the members of diagnosis.json, verdict and false_alarm_probability null while \
+        there is no answer; of a running diagnosis also `progress`: state (collecting, searching, current, refused, failed), sentence, \
+        windows_seen, windows_beyond, windows_searched, first_clock_s, last_clock_s, revision, calibration, inputs, at_rest, \
+        time_to_detect_s, time_to_name_s, counted_from (onset, logged_start, first_data), counted_from_clock_s, searches, alarm_clock_s, \
+        name_clock_s, name, alarm_came_at_once, name_came_at_once, alarms_withdrawn, searches_failed, looks"),
+        (status = 404, description = "there is none"), (status = 500, description = "the file that lies there is no JSON")))]
 pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Response, Problem> {
     if let Some(report) = app.desk.report() {
         return Ok(Json(&*report).into_response());
@@ -136,7 +134,8 @@ pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Response, Problem>
              CASE_DIR --out DATA/diagnosis.json`",
         )
     })?;
-    serde_json::from_slice::<Value>(&text)
-        .map(|value| Json(value).into_response())
-        .map_err(|error| Problem::not_found(format!("diagnosis.json in the data directory is no JSON: {error}")))
+    serde_json::from_slice::<Value>(&text).map(|value| Json(value).into_response()).map_err(|error| {
+        let detail = format!("diagnosis.json in the data directory is no JSON: {error}");
+        Problem::new(StatusCode::INTERNAL_SERVER_ERROR, detail)
+    })
 }

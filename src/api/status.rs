@@ -38,6 +38,36 @@ pub struct Status {
     pub accel: AccelStatus,
     /// The WebSocket.
     pub live: LiveStatus,
+    /// The running diagnosis; null where none runs.
+    pub diagnosis: Option<DiagnosisStatus>,
+}
+
+/// The running diagnosis, in short.
+#[derive(Debug, Clone, Serialize, ToSchema)]
+pub struct DiagnosisStatus {
+    /// `collecting`, `searching`, `current`, `refused` or `failed`.
+    pub state: &'static str,
+    /// One or two sentences for an operator.
+    pub sentence: String,
+    /// `consistent`, `explained`, `ambiguous` or `unexplained`; null while there is no answer.
+    pub verdict: Option<&'static str>,
+    /// Last window of the look that raised the alarm that stands, clock s.
+    pub alarm_clock_s: Option<f64>,
+    /// The name that stands; empty where there is none.
+    pub name: Vec<String>,
+}
+
+impl DiagnosisStatus {
+    fn of(report: &Report) -> Self {
+        let progress = &report.progress;
+        Self {
+            state: progress.state.word(),
+            sentence: progress.sentence.clone(),
+            verdict: report.answer.as_ref().map(|answer| answer.verdict.word()),
+            alarm_clock_s: progress.milestones.alarm_clock_s,
+            name: progress.milestones.name.clone(),
+        }
+    }
 }
 
 /// The dump port and the raw log.
@@ -159,6 +189,7 @@ pub async fn status(State(app): State<Arc<App>>) -> Json<Status> {
             delivered: counted(&counters.live_delivered),
             lagged: counted(&counters.live_lagged),
         },
+        diagnosis: app.desk.report().map(|report| DiagnosisStatus::of(&report)),
     })
 }
 
@@ -262,8 +293,13 @@ fn note_diagnosis(report: &Report) {
     counter!("oare_diagnosis_searches_total").absolute(progress.milestones.searches);
     counter!("oare_diagnosis_searches_failed_total").absolute(progress.milestones.searches_failed);
     counter!("oare_diagnosis_alarms_withdrawn_total").absolute(progress.milestones.alarms_withdrawn);
+    for state in Progress::ALL {
+        let is_here = f64::from(u8::from(progress.state == state));
+        gauge!("oare_diagnosis_state", "state" => state.word()).set(is_here);
+    }
     gauge!("oare_diagnosis_searching").set(f64::from(u8::from(progress.state == Progress::Searching)));
     gauge!("oare_diagnosis_windows_seen").set(progress.windows_seen as f64);
+    gauge!("oare_diagnosis_windows_beyond").set(progress.windows_beyond as f64);
     gauge!("oare_diagnosis_windows_searched").set(progress.windows_searched as f64);
     gauge!("oare_diagnosis_alarm").set(f64::from(u8::from(progress.milestones.alarm_clock_s.is_some())));
     gauge!("oare_diagnosis_time_to_detect_seconds").set(progress.time_to_detect_s.unwrap_or(f64::NAN));

@@ -73,7 +73,10 @@ pub fn run(args: Args) -> Result<ExitCode> {
         let landed = CancellationToken::new();
         let (to, over) = (service.ingest_address, landed.clone());
         let flight = tokio::task::spawn_blocking(move || fly(&mission, to, args.speed, args.seed, &over));
-        super::serve::told_to_end().await?;
+        tokio::select! {
+            told = super::serve::told_to_end() => told?,
+            () = service.failed() => {}
+        }
         landed.cancel();
         flight.await.map_err(|error| anyhow!("the mission broke off: {error}"))??;
         service.drain().await?;

@@ -55,7 +55,11 @@ pub fn run(args: Args) -> Result<ExitCode> {
             Err(error) => return Err(error.into()),
         };
         eprintln!("oare serve: dumps at {}, products at http://{}/", service.ingest_address, service.http_address);
-        told_to_end().await?;
+        tokio::select! {
+            told = told_to_end() => told?,
+            // The drain says why, and with it the exit code.
+            () = service.failed() => {}
+        }
         eprintln!("oare serve: ending; what is being sent is taken first");
         service.drain().await?;
         Ok(super::DONE)

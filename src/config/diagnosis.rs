@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::Fault;
 use super::section::Section;
 use crate::challenge::folder;
-use crate::diagnose::case::{Expectation, Header, Texts};
+use crate::diagnose::case::{Expectation, Header, KEYS, NEEDED, Texts};
 use crate::diagnose::catalogue;
 use crate::diagnose::error::CaseError;
 use crate::diagnose::live::Policy;
@@ -67,8 +67,7 @@ impl DiagnosisConfig {
     /// # Errors
     /// What is wrong with each of them, all at once.
     pub fn expectation(&self, time: &MissionTime) -> Result<Expectation, Vec<Fault>> {
-        let at = |key: &str, sentence: String| Fault { place: format!("diagnosis.{key}"), sentence };
-        let mut header = self.header(time).map_err(|sentence| vec![at("case", sentence)])?;
+        let mut header = self.header(time)?;
         let folder = self.case.as_deref().and_then(Path::parent).unwrap_or(Path::new(""));
         let files = &mut header.files;
         for (named, given) in [
@@ -124,16 +123,59 @@ impl DiagnosisConfig {
         }
     }
 
-    fn header(&self, time: &MissionTime) -> Result<Header, String> {
+    fn header(&self, time: &MissionTime) -> Result<Header, Vec<Fault>> {
+        let faults = self.faults_of_set();
+        if !faults.is_empty() {
+            return Err(faults);
+        }
         let text = match &self.case {
-            Some(path) => {
-                fs::read_to_string(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?
-            }
+            Some(path) => fs::read_to_string(path)
+                .map_err(|error| vec![at("case", format!("cannot read {}: {error}", path.display()))])?,
             None => format!(
                 "[case]\nid = \"live\"\nepoch_utc = \"{}\"\nliftoff_clock_s = {:?}\n[recording]\nkind = \"recorder_dump\"\n",
                 time.epoch_utc, time.liftoff_clock_s
             ),
         };
-        Header::parse(&text, &self.set).map_err(|error| error.to_string())
+        let header = Header::parse(&text, &self.set).map_err(|error| {
+            let is_set = matches!(&error, CaseError::Key { key, .. } if self.keys_set().any(|set| set == key));
+            let file = self.case.as_ref().map_or("case.toml".into(), |path| path.display().to_string());
+            vec![at(if is_set { "set" } else { "case" }, error.to_string().replacen("case.toml", &file, 1))]
+        })?;
+        match header.kind.as_str() {
+            "acceleration_csv" | "recorder_dump" => Ok(header),
+            kind => Err(vec![at(
+                "case",
+                format!(
+                    "its recording.kind is {kind:?}; a running diagnosis compares acceleration_csv or recorder_dump"
+                ),
+            )]),
+        }
     }
+
+    /// The keys that are overridden.
+    fn keys_set(&self) -> impl Iterator<Item = &str> {
+        self.set.iter().filter_map(|item| item.split_once('=')).map(|(key, _)| key.trim())
+    }
+
+    /// What is wrong with the overrides, and where there is no case, what of the vehicle they lack.
+    fn faults_of_set(&self) -> Vec<Fault> {
+        let no_item = |item: &&String| !item.contains('=');
+        let mut faults: Vec<Fault> = self
+            .set
+            .iter()
+            .filter(no_item)
+            .map(|item| at("set", format!("found {item:?}; an override is key=value, such as vehicle.mass_kg=104500")))
+            .collect();
+        let unknown = self.keys_set().filter(|key| !KEYS.contains(key));
+        faults.extend(unknown.map(|key| at("set", format!("found the key {key:?}; the keys are {}", KEYS.join(", ")))));
+        let missing = NEEDED.iter().filter(|(key, _)| self.case.is_none() && !self.keys_set().any(|set| set == *key));
+        faults.extend(missing.map(|(key, example)| {
+            at("set", format!("found no {key}; where diagnosis.case is not given it stands here: \"{key}={example}\""))
+        }));
+        faults
+    }
+}
+
+fn at(key: &str, sentence: String) -> Fault {
+    Fault { place: format!("diagnosis.{key}"), sentence }
 }

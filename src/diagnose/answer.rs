@@ -1,12 +1,12 @@
 //! The answer, field by field as `diagnosis.json` has it. Not here: how it is reached, and how it is drawn.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The least false-alarm probability that is told: nothing is known to hold farther out.
 pub const LEAST_PROBABILITY: f64 = 1e-12;
 
 /// The answer to one case. `NaN` never appears: what is not known is absent or null.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Always `oare.diagnosis/1`.
     pub schema: String,
@@ -47,7 +47,7 @@ pub struct Diagnosis {
     /// One entry per satellite, for orbits.
     pub arcs: Vec<Arc>,
     /// What the reader must know before trusting the figures: a failed whiteness gate, a rejected size, a failed placebo.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
 }
 
@@ -77,7 +77,7 @@ impl Diagnosis {
 }
 
 /// Where a false-alarm probability comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
     /// Records of noise alone, simulated once.
@@ -106,7 +106,7 @@ impl Source {
 }
 
 /// What is claimed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Nothing is claimed; upper limits say how small each effect must be.
@@ -132,7 +132,7 @@ impl Verdict {
 }
 
 /// Where the mismatch is.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Located {
     /// Axes that carry it.
     pub axes: Vec<String>,
@@ -150,7 +150,7 @@ pub struct Located {
 }
 
 /// A span of time and why it is named.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// From, instrument clock.
     pub start_s: f64,
@@ -161,7 +161,7 @@ pub struct Interval {
 }
 
 /// A covariate the residual follows.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Covariate {
     /// Its name.
     pub name: String,
@@ -170,7 +170,7 @@ pub struct Covariate {
 }
 
 /// A line of the spectrum.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OrbitLine {
     /// Frequency.
     pub cycles_per_orbit: f64,
@@ -181,7 +181,7 @@ pub struct OrbitLine {
 }
 
 /// One named effect.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EffectAnswer {
     /// Catalogue id.
     pub id: String,
@@ -209,7 +209,7 @@ impl EffectAnswer {
 }
 
 /// A number with its standard error.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterAnswer {
     /// Name as in the catalogue.
     pub name: String,
@@ -222,7 +222,7 @@ pub struct ParameterAnswer {
 }
 
 /// Another possible set.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Alternative {
     /// Its ids.
     pub effects: Vec<String>,
@@ -233,7 +233,7 @@ pub struct Alternative {
 }
 
 /// A formula, never a physical name.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Hypothesis {
     /// The formula.
     pub formula: String,
@@ -247,7 +247,7 @@ pub struct Hypothesis {
 }
 
 /// Before and after.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fit {
     /// RMS of the noise alone, by the fitted noise model.
     pub noise_floor_ng: [f64; 3],
@@ -270,7 +270,7 @@ pub struct Fit {
 }
 
 /// RMS and whitened misfit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FitLevel {
     /// Per axis, a constant removed.
     pub rms_ng: [f64; 3],
@@ -279,7 +279,7 @@ pub struct FitLevel {
 }
 
 /// Prediction of data left out of the fit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HeldOut {
     /// How the data were divided.
     pub scheme: String,
@@ -297,7 +297,7 @@ pub struct HeldOut {
 }
 
 /// A limit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct UpperLimit {
     /// Catalogue id.
     pub id: String,
@@ -306,7 +306,7 @@ pub struct UpperLimit {
 }
 
 /// An observation that would decide.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SeparatingObservation {
     /// attitude, table_flip or log.
     pub kind: String,
@@ -317,7 +317,7 @@ pub struct SeparatingObservation {
 }
 
 /// One satellite's part of an orbit case.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Arc {
     /// Satellite.
     pub id: String,

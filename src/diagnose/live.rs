@@ -1,36 +1,39 @@
 //! The running diagnosis: what the windows so far say, looked at again as they come.
 //!
-//! The physics along the ancillary data is laid out once; every look measures only what the windows are, starts its noise from
-//! the look before and searches the whole catalogue. A look is taken when enough windows are new, so the answer is a function of
-//! the windows so far and of where the looks fell, and at rest it is that of `oare diagnose` on the same windows, but for the
-//! level of proof: many looks are many chances, so an alarm needs posterior odds that no number of looks reaches by chance
+//! The physics along the ancillary data is laid out once; every look measures only what the windows are and searches the whole
+//! catalogue. While more windows come it starts its noise from the look before, so that where the looks fell shows in the last digits;
+//! at rest it does not, and the answer is that of `oare diagnose` on the same windows, but for the level of proof: many looks are many chances, so an alarm needs posterior odds that no number of looks reaches by chance
 //! oftener than is allowed (Ville 1939: an evidence ratio of 1/p is met with probability p at most, however long one waits), and
 //! what remains beside it is charged for the looks before.
 //!
 //! Not here: threads, clocks, who brings the windows and who is told.
 
+mod inputs;
+mod progress;
+
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
+pub use inputs::digest;
+pub use progress::{CountedFrom, Look, Milestones, News, Progress, Report, State, news};
+use progress::{Found, add, beyond_sentence, digits, waiting_sentence};
 
-use super::answer::{Diagnosis, Source, Verdict};
-use super::case::{Case, Expectation, WINDOW_STRIDE_S, WINDOWS_MIN};
+use super::answer::{Diagnosis, EffectAnswer, Source};
+use super::case::{Case, Expectation, HALF_WINDOW_S, Recording, WINDOW_STRIDE_S, WINDOWS_MIN};
+use super::catalogue;
 use super::error::CaseError;
 use super::noise::AxisNoise;
 use super::null_table;
 use super::order::solve_at_its_order;
-use super::recorder::Usable;
+use super::recorder::ALL_TIME;
+pub use super::recorder::Seen;
 use super::report;
 use super::scene::{Scene, Surroundings};
 use super::solve::{Library, Stop, null_noise};
 use super::verdict::{self, Proof};
 use crate::math::shared_work;
 
-/// Looks kept for readers.
-const LOOKS_MAX: usize = 100;
-/// What times are counted from.
-const ONSET: &str = "onset";
-const FIRST_DATA: &str = "first_data";
+/// Windows that are so many times what is needed for a search came at once: how late a finding is, is then no matter of searches.
+const AT_ONCE: f64 = 2.0;
 
 /// When and how to look.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,163 +52,92 @@ impl Default for Policy {
     }
 }
 
-/// What was seen at one look.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Look {
-    /// Windows looked at.
-    pub windows: usize,
-    /// Centre of the last of them, instrument clock.
-    pub last_clock_s: f64,
-    /// The verdict.
-    pub verdict: Verdict,
-    /// The effects named.
-    pub named: Vec<String>,
-    /// Log posterior odds of the best hypothesis against nothing.
-    pub log_odds: f64,
-}
-
-/// When something was found, as far as it stands. Lasts over restarts.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Milestones {
-    /// Looks taken.
-    pub searches: u64,
-    /// Last window of the first look of the alarm that stands.
-    pub alarm_clock_s: Option<f64>,
-    /// Last window of the first look that gave the name that stands.
-    pub name_clock_s: Option<f64>,
-    /// The name that stands; empty where there is none.
-    pub name: Vec<String>,
-    /// Alarms that a later look took back.
-    pub alarms_withdrawn: u64,
-    /// Looks that failed, by a defect of the program.
-    #[serde(default)]
-    pub searches_failed: u64,
-}
-
-/// Where the running diagnosis is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum State {
-    /// Too few windows for any answer.
-    Collecting,
-    /// A search is under way.
-    Searching,
-    /// The answer holds for all windows but the newest few.
-    Current,
-    /// The windows so far cannot be compared with the simulation; the sentence says why.
-    Refused,
-    /// The last search failed, by a defect of the program: the answer is that of the look before.
-    Failed,
-}
-
-/// How far it is.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Progress {
-    /// Where it is.
-    pub state: State,
-    /// One or two sentences for an operator.
-    pub sentence: String,
-    /// Usable windows known.
-    pub windows_seen: usize,
-    /// Of those, windows the answer rests on.
-    pub windows_searched: usize,
-    /// Centre of the first window the answer rests on.
-    pub first_clock_s: Option<f64>,
-    /// Centre of the last one: the answer is as of here.
-    pub last_clock_s: Option<f64>,
-    /// Digest of the revisions of the products it rests on.
-    pub revision: String,
-    /// Version of the calibration they were made with.
-    pub calibration: u32,
-    /// Recording seconds from the effect's onset (or the first data) to the last window of the look that raised the alarm.
-    pub time_to_detect_s: Option<f64>,
-    /// The same to the look that gave the name that stands.
-    pub time_to_name_s: Option<f64>,
-    /// What these are counted from: `onset` or `first_data`.
-    pub counted_from: &'static str,
-    /// Instrument clock they are counted from.
-    pub counted_from_clock_s: Option<f64>,
-    /// When something was found.
-    #[serde(flatten)]
-    pub milestones: Milestones,
-    /// The last looks, oldest first.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub looks: Vec<Look>,
-}
-
-/// The answer so far: `diagnosis.json` and how far it is.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Report {
-    /// The answer; `consistent` with probability 1 while there is none.
-    #[serde(flatten)]
-    pub diagnosis: Diagnosis,
-    /// How far it is.
-    pub progress: Progress,
-}
-
 /// A running diagnosis.
 pub struct Live {
     expected: Arc<Expectation>,
     surroundings: Arc<Surroundings>,
     policy: Policy,
+    inputs: u64,
     noise: Option<[AxisNoise; 3]>,
     milestones: Milestones,
     looks: Vec<Look>,
-    diagnosis: Diagnosis,
-    /// What the last look rested on: windows before it, digest, calibration, and the span of the windows used.
+    answer: Option<Answer>,
+    /// What was looked at last, whatever came of it.
     seen: Seen,
-    used: Option<[f64; 2]>,
-    windows_searched: usize,
     state: State,
     sentence: String,
 }
 
-/// What there is to look at.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Seen {
-    /// Usable windows.
-    pub windows: usize,
-    /// Digest of their revisions.
-    pub digest: u64,
-    /// Version of their calibration.
-    pub calibration: u32,
-}
-
-impl From<&Usable> for Seen {
-    fn from(usable: &Usable) -> Self {
-        Self { windows: usable.recording.clock_s.len(), digest: usable.digest, calibration: usable.calibration }
-    }
+/// An answer and what it rests on.
+#[derive(Clone)]
+struct Answer {
+    diagnosis: Diagnosis,
+    windows: usize,
+    span_s: [f64; 2],
+    revision: String,
+    calibration: u32,
+    /// No noise of a look before was its beginning.
+    from_scratch: bool,
 }
 
 impl Live {
-    /// Lays out the physics along the ancillary data; nothing is seen yet.
+    /// Lays out the physics along the ancillary data; nothing is seen yet but what an `earlier` run told of the same inputs.
     ///
     /// # Errors
     /// Where an attitude or an instant defeats the physics.
-    pub fn new(expected: Expectation, policy: Policy, milestones: Milestones) -> Result<Self, CaseError> {
+    pub fn new(expected: Expectation, policy: Policy, earlier: Option<Report>) -> Result<Self, CaseError> {
         let surroundings = Arc::new(Surroundings::new(&expected)?);
-        let diagnosis = Diagnosis::nothing(&expected.header.id, 1.0);
+        let inputs = digest(&expected, &policy);
+        let earlier = earlier.unwrap_or_else(|| Report::waiting(&expected.header.id, inputs));
+        let Report { answer, progress, .. } = earlier;
+        let answer = answer.zip(progress.first_clock_s.zip(progress.last_clock_s));
+        let answer = answer.map(|(diagnosis, (first_s, last_s))| Answer {
+            diagnosis,
+            windows: progress.windows_searched,
+            span_s: [first_s, last_s],
+            revision: progress.revision,
+            calibration: progress.calibration,
+            from_scratch: progress.at_rest,
+        });
         Ok(Self {
             expected: Arc::new(expected),
             surroundings,
             policy,
+            inputs,
             noise: None,
-            milestones,
-            looks: Vec::new(),
-            diagnosis,
+            milestones: progress.milestones,
+            looks: progress.looks,
+            answer,
             seen: Seen::default(),
-            used: None,
-            windows_searched: 0,
-            state: State::Collecting,
-            sentence: String::new(),
+            state: progress.state,
+            sentence: progress.sentence,
         })
     }
 
+    /// The span that windows are compared in: of the case, and where simulation and ancillary data hold all of a window.
+    pub fn span_s(&self) -> [f64; 2] {
+        let within = |grid: &[f64]| [grid[0] + HALF_WINDOW_S, grid[grid.len() - 1] - HALF_WINDOW_S];
+        let spans = [within(&self.expected.simulation.clock_s), within(&self.expected.ancillary.clock_s)];
+        let asked = self.expected.header.span_s;
+        spans.iter().fold(asked, |span, other| [span[0].max(other[0]), span[1].min(other[1])])
+    }
+
+    /// The span of the windows that a look takes: where too few can be compared it takes all, and says of all why not.
+    pub fn span_to_take_s(&self, seen: &Seen) -> [f64; 2] {
+        if seen.windows < WINDOWS_MIN { ALL_TIME } else { self.span_s() }
+    }
+
     /// Whether a look is due: enough windows are new, or the old ones have another calibration; or, when nothing more `is_coming`
-    /// for now, any difference at all.
+    /// for now, any difference at all, and where there is none an answer that began at the noise of a look before.
     pub fn is_due(&self, seen: &Seen, is_coming: bool) -> bool {
-        if seen.windows < WINDOWS_MIN || seen.digest == self.seen.digest {
-            return false;
+        if seen.windows < WINDOWS_MIN {
+            // Nothing can be compared, and that is said; later in other words, when nothing more comes.
+            let are_too_few = seen.windows + seen.beyond >= WINDOWS_MIN;
+            return are_too_few && (self.state != State::Refused || (!is_coming && *seen != self.seen));
+        }
+        if seen.digest == self.seen.digest {
+            let has_a_past = self.answer.as_ref().is_some_and(|answer| !answer.from_scratch);
+            return !is_coming && has_a_past && self.state == State::Current;
         }
         let fresh_s = seen.windows.saturating_sub(self.seen.windows) as f64 * WINDOW_STRIDE_S;
         self.seen.windows == 0
@@ -214,43 +146,54 @@ impl Live {
             || seen.calibration != self.seen.calibration
     }
 
-    /// Looks at the windows so far; whether it did: not when `stop` said so in between.
-    pub fn look(&mut self, usable: Usable, stop: Stop) -> bool {
-        let seen = Seen::from(&usable);
-        let case = match Case::meet(self.expected.clone(), usable.recording) {
+    /// Looks at the windows so far; whether it did: not when `stop` said so in between. When nothing more `is_coming` it looks as if
+    /// for the first time, so that where the looks before fell leaves no trace in what is said at rest.
+    pub fn look(&mut self, seen: Seen, recording: Recording, is_coming: bool, stop: Stop) -> bool {
+        let case = match Case::meet(self.expected.clone(), recording) {
             Ok(case) => case,
             Err(error) => {
                 self.seen = seen;
                 self.state = State::Refused;
+                self.answer = None;
                 self.sentence = format!("The windows so far cannot be compared with the simulation: {error}");
                 return true;
             }
         };
+        let before = self.noise.as_ref().filter(|_| is_coming);
+        let from_scratch = before.is_none();
         let mut scene = Scene::within(&case, self.surroundings.clone());
-        let (library, noise) = shared_work::both(
-            || Library::new(&scene, &self.policy.without),
-            || null_noise(&scene, self.noise.as_ref()),
-        );
+        let (library, noise) =
+            shared_work::both(|| Library::new(&scene, &self.policy.without), || null_noise(&scene, before));
         let Some(solution) = solve_at_its_order(&mut scene, &library, noise, stop) else { return false };
         // The order is chosen anew at every look.
         self.noise = Some(solution.null.noise.map(|noise| AxisNoise { resonance: None, ..noise }));
         let log_odds = solution.proven(&scene, &library.entries);
-        let clock_s = scene.clock_s();
+        let revision = digits(seen.digest);
+        // The same windows once more are no further chance.
+        let is_another = self.answer.as_ref().is_none_or(|answer| answer.revision != revision);
         let proof = Proof {
             statistic: log_odds,
             probability: anytime_probability(log_odds),
             source: Source::Looks,
             claim: self.policy.claim_probability,
-            chances: chances_at(self.milestones.searches + 1),
+            chances: chances_at((self.milestones.searches + u64::from(is_another)).max(1)),
         };
         let (diagnosis, _, _) = verdict::conclude(&scene, &library, &solution, proof);
-        self.used = Some([clock_s[0], clock_s[clock_s.len() - 1]]);
-        self.windows_searched = clock_s.len();
+        let clock_s = scene.clock_s();
+        let (windows, span_s) = (clock_s.len(), [clock_s[0], clock_s[clock_s.len() - 1]]);
         self.seen = seen;
         self.state = State::Current;
         self.sentence = report::sentence(&diagnosis);
-        self.note(&diagnosis, log_odds);
-        self.diagnosis = diagnosis;
+        let (verdict, last_clock_s) = (diagnosis.verdict, span_s[1]);
+        let named: Vec<String> = diagnosis.effects.iter().map(|e| e.id.clone()).collect();
+        let before = self.answer.as_ref().map_or(0, |answer| answer.windows);
+        let fresh_s = windows.saturating_sub(before) as f64 * WINDOW_STRIDE_S;
+        let due_s = self.policy.search_every_s.max(WINDOWS_MIN as f64 * WINDOW_STRIDE_S);
+        let came_at_once = fresh_s > AT_ONCE * due_s;
+        self.milestones.take(Found { verdict, named: &named, last_clock_s, is_another, came_at_once });
+        add(&mut self.looks, Look { windows, last_clock_s, verdict, named, log_odds }, is_another);
+        self.answer =
+            Some(Answer { diagnosis, windows, span_s, revision, calibration: seen.calibration, from_scratch });
         true
     }
 
@@ -263,105 +206,67 @@ impl Live {
         self.sentence = format!(
             "The search over the {} windows so far failed, by a defect of the program that its log tells; the answer is that of the {} \
              windows searched before. The next windows are searched with all others.",
-            seen.windows, self.windows_searched
+            seen.windows,
+            self.answer.as_ref().map_or(0, |answer| answer.windows)
         );
     }
 
-    fn note(&mut self, diagnosis: &Diagnosis, log_odds: f64) {
-        let Some([_, last_clock_s]) = self.used else { return };
-        let named: Vec<String> = diagnosis.effects.iter().map(|e| e.id.clone()).collect();
-        self.milestones.take(diagnosis.verdict, &named, last_clock_s);
-        let windows = self.windows_searched;
-        self.looks.push(Look { windows, last_clock_s, verdict: diagnosis.verdict, named, log_odds });
-        if self.looks.len() > LOOKS_MAX {
-            self.looks.remove(0);
-        }
-    }
-
-    /// The answer so far, with so many usable windows known by now, and whether a search is under way.
-    pub fn report(&self, windows_seen: usize, is_searching: bool) -> Report {
-        let onsets: Vec<f64> = self.diagnosis.effects.iter().filter_map(|e| e.parameter("onset_s")).collect();
-        let by_onset = !onsets.is_empty() && onsets.len() == self.diagnosis.effects.len();
-        let first = self.used.map(|used| used[0]);
-        let from = if by_onset { onsets.into_iter().reduce(f64::min) } else { first };
+    /// The answer so far, with the usable windows known by now, and whether a search is under way.
+    pub fn report(&self, seen: &Seen, is_searching: bool) -> Report {
+        let windows_seen = seen.windows + seen.beyond;
+        let answer = self.answer.as_ref();
+        let (counted_from, from) = answer.map_or((CountedFrom::FirstData, None), |answer| {
+            began(&self.expected, &answer.diagnosis.effects, answer.span_s[0])
+        });
         let since = |clock_s: Option<f64>| Some((clock_s? - from?).max(0.0));
-        let sentence = match self.state {
-            State::Collecting => waiting_sentence(windows_seen),
+        let mut sentence = match self.state {
+            State::Collecting => waiting_sentence(seen.windows),
             _ => self.sentence.clone(),
         };
+        if seen.beyond > 0 && self.state != State::Refused {
+            sentence.push_str(&beyond_sentence(seen, self.span_s()));
+        }
+        let is_whole = |answer: &Answer| answer.from_scratch && answer.revision == digits(seen.digest);
+        let at_rest = !is_searching && self.state == State::Current && answer.is_some_and(is_whole);
         let progress = Progress {
             state: if is_searching { State::Searching } else { self.state },
             sentence,
             windows_seen,
-            windows_searched: self.windows_searched,
-            first_clock_s: first,
-            last_clock_s: self.used.map(|used| used[1]),
-            revision: format!("{:016x}", self.seen.digest),
-            calibration: self.seen.calibration,
+            windows_beyond: seen.beyond,
+            windows_searched: answer.map_or(0, |answer| answer.windows),
+            first_clock_s: answer.map(|answer| answer.span_s[0]),
+            last_clock_s: answer.map(|answer| answer.span_s[1]),
+            revision: answer.map_or(digits(0), |answer| answer.revision.clone()),
+            calibration: answer.map_or(0, |answer| answer.calibration),
+            inputs: digits(self.inputs),
+            at_rest,
             time_to_detect_s: since(self.milestones.alarm_clock_s),
             time_to_name_s: since(self.milestones.name_clock_s),
-            counted_from: if by_onset { ONSET } else { FIRST_DATA },
+            counted_from,
             counted_from_clock_s: from,
             milestones: self.milestones.clone(),
             looks: self.looks.clone(),
         };
-        Report { diagnosis: self.diagnosis.clone(), progress }
+        let case = self.expected.header.id.clone();
+        Report { case, answer: answer.map(|answer| answer.diagnosis.clone()), progress }
     }
 }
 
-impl Report {
-    /// No answer yet.
-    pub fn waiting(case: &str) -> Self {
-        Self::without_answer(case, State::Collecting, waiting_sentence(0))
-    }
-
-    /// No answer will come.
-    pub fn refused(case: &str, error: &CaseError) -> Self {
-        Self::without_answer(case, State::Refused, error.to_string())
-    }
-
-    fn without_answer(case: &str, state: State, sentence: String) -> Self {
-        let progress = Progress {
-            state,
-            sentence,
-            windows_seen: 0,
-            windows_searched: 0,
-            first_clock_s: None,
-            last_clock_s: None,
-            revision: format!("{:016x}", 0),
-            calibration: 0,
-            time_to_detect_s: None,
-            time_to_name_s: None,
-            counted_from: FIRST_DATA,
-            counted_from_clock_s: None,
-            milestones: Milestones::default(),
-            looks: Vec::new(),
-        };
-        Self { diagnosis: Diagnosis::nothing(case, 1.0), progress }
-    }
-}
-
-fn waiting_sentence(windows: usize) -> String {
-    format!("{windows} usable windows so far; {WINDOWS_MIN} are needed before anything can be said.")
-}
-
-impl Milestones {
-    /// Takes the verdict of one more look.
-    fn take(&mut self, verdict: Verdict, named: &[String], last_clock_s: f64) {
-        self.searches += 1;
-        if verdict == Verdict::Consistent {
-            self.alarms_withdrawn += u64::from(self.alarm_clock_s.is_some());
-            self.alarm_clock_s = None;
-        } else {
-            self.alarm_clock_s.get_or_insert(last_clock_s);
+/// Since when what an answer names was there to be found, and what says so.
+fn began(expected: &Expectation, effects: &[EffectAnswer], first_s: f64) -> (CountedFrom, Option<f64>) {
+    let onset = |e: &EffectAnswer| e.parameter("onset_s").map(|at| (CountedFrom::Onset, at));
+    let logged = |e: &EffectAnswer| {
+        let spans = expected.spans(catalogue::logged_kind(&e.id)?);
+        let starts = spans.iter().filter(|span| span[1] >= first_s).map(|span| span[0].max(first_s));
+        starts.reduce(f64::min).map(|at| (CountedFrom::LoggedStart, at))
+    };
+    let began: Vec<_> = effects.iter().filter_map(|e| onset(e).or_else(|| logged(e))).collect();
+    match began.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
+        Some((_, at)) if began.len() == effects.len() => {
+            let all_logged = began.iter().all(|(by, _)| *by == CountedFrom::LoggedStart);
+            (if all_logged { CountedFrom::LoggedStart } else { CountedFrom::Onset }, Some(*at))
         }
-        // One name is one set, told without a rival.
-        let mut name = if verdict == Verdict::Explained { named.to_vec() } else { Vec::new() };
-        name.sort_unstable();
-        if name != self.name {
-            self.name_clock_s = (!name.is_empty()).then_some(last_clock_s);
-            self.name = name;
-        }
+        _ => (CountedFrom::FirstData, Some(first_s)),
     }
 }
 
@@ -379,34 +284,42 @@ fn chances_at(look: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn named(names: &[&str]) -> Vec<String> {
-        names.iter().map(|name| name.to_string()).collect()
-    }
+    use crate::diagnose::answer::ParameterAnswer;
+    use crate::diagnose::case::Event;
 
     #[test]
-    fn an_alarm_and_a_name_count_from_the_first_look_of_an_unbroken_run() {
-        let mut m = Milestones::default();
-        m.take(Verdict::Consistent, &[], 100.0);
-        m.take(Verdict::Unexplained, &[], 200.0);
-        m.take(Verdict::Explained, &named(&["vent_leak"]), 300.0);
-        m.take(Verdict::Explained, &named(&["vent_leak"]), 400.0);
-        assert_eq!((m.alarm_clock_s, m.name_clock_s, m.alarms_withdrawn), (Some(200.0), Some(300.0), 0));
-        m.take(Verdict::Ambiguous, &named(&["vent_leak"]), 500.0);
-        assert_eq!((m.alarm_clock_s, m.name_clock_s), (Some(200.0), None), "a set with a rival is no name");
-        m.take(Verdict::Explained, &named(&["water_dump", "vent_leak"]), 600.0);
-        m.take(Verdict::Explained, &named(&["vent_leak", "water_dump"]), 700.0);
-        assert_eq!(m.name_clock_s, Some(600.0), "the order of names is no difference");
-        m.take(Verdict::Consistent, &[], 800.0);
-        assert_eq!((m.alarm_clock_s, m.name_clock_s, m.alarms_withdrawn, m.searches), (None, None, 1, 8));
-    }
-
-    #[test]
-    fn milestones_last_over_a_restart() {
-        let m =
-            Milestones { searches: 7, alarm_clock_s: Some(1.5), name: named(&["vent_leak"]), ..Milestones::default() };
-        let json = serde_json::to_value(&m).unwrap();
-        assert_eq!(serde_json::from_value::<Milestones>(json).unwrap(), m);
+    fn times_count_from_an_onset_or_a_start_in_the_log_where_every_effect_has_one() {
+        let expected = inputs::tests::expected(|e| {
+            let dump = |clock_s| Event { clock_s, duration_s: 100.0, kind: "water_dump".into(), detail: String::new() };
+            e.events = [50.0, 950.0, 5000.0].map(dump).into();
+        });
+        let effect = |id: &str, onset_s: Option<f64>| EffectAnswer {
+            id: id.into(),
+            name: id.into(),
+            posterior: 1.0,
+            parameters: onset_s
+                .map(|value| ParameterAnswer { name: "onset_s".into(), value, sigma: 1.0, unit: "s".into() })
+                .into_iter()
+                .collect(),
+            axis: None,
+            why: String::new(),
+            rms_ng: None,
+        };
+        let (dump, leak, offset) =
+            (effect("water_dump", None), effect("vent_leak", Some(3000.0)), effect("cg_offset", None));
+        let of = |effects: &[&EffectAnswer], first_s| {
+            began(&expected, &effects.iter().copied().cloned().collect::<Vec<_>>(), first_s)
+        };
+        assert_eq!(of(&[&dump], 200.0), (CountedFrom::LoggedStart, Some(950.0)), "the first that is recorded");
+        assert_eq!(
+            of(&[&dump], 1000.0),
+            (CountedFrom::LoggedStart, Some(1000.0)),
+            "one under way, from the first window"
+        );
+        assert_eq!(of(&[&leak], 0.0), (CountedFrom::Onset, Some(3000.0)));
+        assert_eq!(of(&[&leak, &dump], 2000.0), (CountedFrom::Onset, Some(3000.0)));
+        assert_eq!(of(&[&dump, &offset], 200.0), (CountedFrom::FirstData, Some(200.0)), "one of them was always there");
+        assert_eq!(of(&[], 200.0), (CountedFrom::FirstData, Some(200.0)));
     }
 
     #[test]

@@ -24,15 +24,26 @@ use crate::units::MissionTime;
 /// OARE axis of each body axis.
 const OARE_AXIS: [usize; 3] = [0, 2, 1];
 
-/// The usable windows of a station, and what they are made of.
-#[derive(Debug, Clone, Default)]
-pub struct Usable {
-    /// Calibrated windows, in order of time.
-    pub recording: Recording,
-    /// Digest of the revisions of their products: the same windows, the same digest.
+/// Which usable windows a station has, without what is in them: enough to know whether there is anything new.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Seen {
+    /// Usable windows within the span that was asked for.
+    pub windows: usize,
+    /// Usable windows beyond it.
+    pub beyond: usize,
+    /// Digest of the revisions of the windows within: the same windows, the same digest.
     pub digest: u64,
-    /// Version of the calibration they were made with; 0: none.
+    /// Version of their calibration; 0: none.
     pub calibration: u32,
+}
+
+/// The usable windows of a station, copied with what their errors derive from: the station is needed no longer.
+#[derive(Debug, Clone, Default)]
+pub struct Taken {
+    recording: Recording,
+    conditions: Vec<Conditions>,
+    calibration: Option<Calibration>,
+    measurements: Vec<BiasMeasurement>,
 }
 
 /// What may be said of a window that is used. Beyond the first and the last calibration the law of the bias is less certain, and what it
@@ -51,20 +62,50 @@ fn is_scaled(calibration: &Calibration, ranges: [Option<Range>; 3]) -> bool {
     ranges.into_iter().enumerate().all(is_measured)
 }
 
-/// The windows of a station that a diagnosis may use.
-pub fn usable(station: &Station) -> Usable {
-    let mut found = Usable { calibration: station.calibration().map_or(0, |c| c.version), ..Usable::default() };
-    let mut conditions = Vec::new();
-    for (window, product) in station.windows().zip(station.products()) {
-        if product.quality.is_good_but_for(FORGIVEN)
-            && station.calibration().is_some_and(|calibration| is_scaled(calibration, product.range))
+/// The windows of a station that a diagnosis may use, with their deviations on the body axes, ng.
+fn usable_windows(station: &Station) -> impl Iterator<Item = (&Window, &Product, [f64; 3])> {
+    let calibration = station.calibration();
+    station.windows().zip(station.products()).filter_map(move |(window, product)| {
+        let calibration = calibration?;
+        let may = product.quality.is_good_but_for(FORGIVEN)
+            && is_scaled(calibration, product.range)
             && product.mode == Mode::Normal
-            && push(&mut found.recording, station, window, product)
-        {
+            && product.acceleration.is_some();
+        let deviation_ng = if may { deviation_ng(calibration, window, product) } else { None };
+        Some((window, product, deviation_ng?))
+    })
+}
+
+/// Which usable windows a station has, those with their centre in a span and those beyond it.
+pub fn seen(station: &Station, span_s: [f64; 2]) -> Seen {
+    let mut seen = Seen { calibration: station.calibration().map_or(0, |c| c.version), ..Seen::default() };
+    for (window, product, _) in usable_windows(station) {
+        if (span_s[0]..=span_s[1]).contains(&window.centre_s()) {
             // Fowler, Noll and Vo's hash, a revision at a time: the windows come in one order.
-            found.digest = (found.digest ^ product.revision.0).wrapping_mul(0x0000_0100_0000_01b3);
-            conditions.push((window.centre_s(), window.temperature_c, product.range));
+            seen.digest = (seen.digest ^ product.revision.0).wrapping_mul(0x0000_0100_0000_01b3);
+            seen.windows += 1;
+        } else {
+            seen.beyond += 1;
         }
+    }
+    seen
+}
+
+/// Copies the usable windows of a station whose centres are in a span.
+pub fn taken(station: &Station, span_s: [f64; 2]) -> Taken {
+    let mut taken = Taken { calibration: station.calibration().cloned(), ..Taken::default() };
+    for (window, product, deviation_ng) in usable_windows(station) {
+        let Some(acceleration) = &product.acceleration else { continue };
+        if !(span_s[0]..=span_s[1]).contains(&window.centre_s()) {
+            continue;
+        }
+        let recording = &mut taken.recording;
+        recording.clock_s.push(window.centre_s());
+        for k in 0..3 {
+            recording.a_ng[k].push(acceleration.trimmed_ng.0[k]);
+            recording.dev_ng[k].push(deviation_ng[k]);
+        }
+        taken.conditions.push((window.centre_s(), window.temperature_c, product.range));
     }
     let fault = |a: &Anomaly| Fault {
         kind: a.kind,
@@ -72,14 +113,25 @@ pub fn usable(station: &Station) -> Usable {
         sentence: a.sentence.clone(),
         answered: saturation::is_answered(station.archive(), a),
     };
-    found.recording.faults = station.derived().anomalies.iter().map(fault).collect();
-    if let Some(calibration) = station.calibration() {
-        let measurements = &station.derived().measurements;
-        found.recording.bias_errors_ng = OARE_AXIS.map(|axis| bias_errors(calibration, axis, &conditions));
-        found.recording.bias_laws = OARE_AXIS.map(|axis| bias_laws(calibration, axis, measurements, &conditions));
-    }
-    found
+    taken.recording.faults = station.derived().anomalies.iter().map(fault).collect();
+    taken.measurements = station.derived().measurements.clone();
+    taken
 }
+
+impl Taken {
+    /// The recording, with what the bias laws of its calibration leave open.
+    pub fn recording(self) -> Recording {
+        let Self { mut recording, conditions, calibration, measurements } = self;
+        if let Some(calibration) = calibration {
+            recording.bias_errors_ng = OARE_AXIS.map(|axis| bias_errors(&calibration, axis, &conditions));
+            recording.bias_laws = OARE_AXIS.map(|axis| bias_laws(&calibration, axis, &measurements, &conditions));
+        }
+        recording
+    }
+}
+
+/// Every clock there is.
+pub const ALL_TIME: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// Clock at the centre of a window, its temperature, C, and the range of each axis.
 type Conditions = (f64, f64, [Option<Range>; 3]);
@@ -221,10 +273,13 @@ pub fn recorded(dump: &[u8], header: &Header) -> Recording {
     let time = MissionTime { epoch_utc: header.epoch_utc, liftoff_clock_s: header.liftoff_clock_s };
     let settings = Settings { time, ..Settings::sts65() };
     let station = replay(&settings, None, |station| take(station, &settings, dump));
-    let mut recording = usable(&station).recording;
+    let mut recording = taken(&station, ALL_TIME).recording();
     recording.notes.extend(of_another_epoch(&station, &time));
     recording
 }
+
+/// The Orbiter's clock is set to UTC: beyond a minute it is another epoch, s.
+const EPOCH_OFF_S: f64 = 60.0;
 
 /// Records whose own UTC is not that of the clock with the epoch of the case: Sun and shadow would be those of another day.
 fn of_another_epoch(station: &Station, time: &MissionTime) -> Option<String> {
@@ -238,9 +293,6 @@ fn of_another_epoch(station: &Station, time: &MissionTime) -> Option<String> {
         )
     })
 }
-
-/// The Orbiter's clock is set to UTC: beyond a minute it is another epoch, s.
-const EPOCH_OFF_S: f64 = 60.0;
 
 fn take(station: &mut Station, settings: &Settings, dump: &[u8]) {
     let mut reader = PlaybackReader::new(settings.link);
@@ -257,21 +309,15 @@ fn take(station: &mut Station, settings: &Settings, dump: &[u8]) {
     reader.finish(&mut file);
 }
 
-/// Adds one window, when all of its axes are calibrated; whether they are.
-fn push(recording: &mut Recording, station: &Station, window: &Window, product: &Product) -> bool {
-    let (Some(acceleration), Some(calibration)) = (&product.acceleration, station.calibration()) else { return false };
-    let deviation_ng = OARE_AXIS.map(|axis| {
+/// The deviation of a window on the body axes, when all of its axes are calibrated.
+fn deviation_ng(calibration: &Calibration, window: &Window, product: &Product) -> Option<[f64; 3]> {
+    let ng = OARE_AXIS.map(|axis| {
         let (window, range) = (window.axes[axis]?, product.range[axis]?);
         let ng = calibration.resolution_ng[axis][range.index()] * calibration.scale[axis][range.index()].correction;
         Some(window.estimate.deviation * ng)
     });
-    let [Some(x), Some(y), Some(z)] = deviation_ng else { return false };
-    recording.clock_s.push(window.centre_s());
-    for (k, deviation) in [x, y, z].into_iter().enumerate() {
-        recording.a_ng[k].push(acceleration.trimmed_ng.0[k]);
-        recording.dev_ng[k].push(deviation);
-    }
-    true
+    let [Some(x), Some(y), Some(z)] = ng else { return None };
+    Some([x, y, z])
 }
 
 #[cfg(test)]

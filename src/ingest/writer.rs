@@ -76,21 +76,23 @@ pub struct Writer {
     taken_again: Option<(Instant, Duration)>,
     /// Frames in use have lost a vote, and the log is not taken again without them yet.
     aside_waits: bool,
+    /// When the log could not be taken again last, while it cannot.
+    aside_failed: Option<Instant>,
 }
 
 impl Writer {
-    /// Takes up where the log ends: replays it, restores the hub, publishes what the journal lacks.
+    /// Takes up where the log ends: replays it, restores the hub from its journal, publishes what that lacks.
     ///
     /// # Errors
     /// When the log cannot be read.
     pub fn restore(
         log: Arc<RawLog>,
+        journal: Journal,
         station: SharedStation,
         hub: Arc<Hub>,
         board: Arc<Board>,
     ) -> Result<Self, StoreError> {
         let start = Instant::now();
-        let journal = log.journal()?;
         let messages = journal.entries.len();
         let mut batch = 0;
         let mut orphans;
@@ -123,6 +125,7 @@ impl Writer {
             calibrated: None,
             taken_again: None,
             aside_waits: false,
+            aside_failed: None,
         };
         let changes = writer.restore_hub(journal);
         let closing = orphans.closing();
@@ -165,7 +168,7 @@ impl Writer {
                     self.take(&batch);
                     self.bring_up();
                     self.publish_waiting();
-                    self.conclude(&batch, parts.is_empty())?;
+                    self.conclude(&batch, parts.is_empty());
                     last_arrival = Instant::now();
                 }
                 Ok(None) => break,
@@ -176,7 +179,7 @@ impl Writer {
                         self.bring_up();
                     }
                     if self.aside_waits {
-                        self.set_frames_aside(1)?;
+                        self.set_frames_aside(1);
                         // Another station has everything to tell again, windows that are not whole too.
                         if !self.aside_waits {
                             self.flush();
@@ -331,28 +334,45 @@ impl Writer {
     }
 
     /// After a batch: partial windows when a playback is over and nothing more waits, and frames that lost a vote.
-    fn conclude(&mut self, batch: &[Entry], nothing_waits: bool) -> Result<(), StoreError> {
-        self.set_frames_aside(AGAIN_PAUSES)?;
+    fn conclude(&mut self, batch: &[Entry], nothing_waits: bool) {
+        self.set_frames_aside(AGAIN_PAUSES);
         let one_ended = batch.iter().any(|entry| matches!(entry, Entry::Closed { .. }));
         if nothing_waits && one_ended {
             self.flush();
         }
-        Ok(())
     }
 
     /// Two good frames of one identity differ, and the one in use lost the vote: the log is taken again without it, beside the station that
-    /// others ask meanwhile. While more such come that waits for `pauses` times as long as it took last.
-    fn set_frames_aside(&mut self, pauses: u32) -> Result<(), StoreError> {
-        let due = self.taken_again.is_none_or(|(when, took)| when.elapsed() >= took * pauses);
+    /// others ask meanwhile. While more such come that waits for `pauses` times as long as it took last. Where the log cannot be read the
+    /// station stays as it is, with the frames it has, and it is tried again.
+    fn set_frames_aside(&mut self, pauses: u32) {
+        let due = self.taken_again.is_none_or(|(when, took)| when.elapsed() >= took * pauses)
+            && self.aside_failed.is_none_or(|when| when.elapsed() >= RETRY);
         if !self.aside_waits || !due {
-            return Ok(());
+            return;
         }
         let start = Instant::now();
         let again = {
             let station = self.station.read().expect("no holder panics");
-            taken_again(&self.log, &station, |_, _, _| {})?
+            taken_again(&self.log, &station, |_, _, _| {})
         };
-        let Some(mut again) = again else { return Ok(()) };
+        let again = match again {
+            Ok(again) => again,
+            Err(error) => {
+                match self.aside_failed {
+                    None => {
+                        tracing::error!(%error, "the log cannot be taken again without frames that lost a vote; it is tried again")
+                    }
+                    Some(_) => tracing::debug!(%error, "the log cannot be taken again yet"),
+                }
+                self.aside_failed = Some(Instant::now());
+                return;
+            }
+        };
+        if self.aside_failed.take().is_some() {
+            tracing::info!("the log is taken again at last");
+        }
+        let Some(mut again) = again else { return };
         let changes = again.settle();
         again.announce_raw(true);
         *self.station.write().expect("no holder panics") = again;
@@ -360,7 +380,6 @@ impl Writer {
         self.aside_waits = false;
         self.publish_untold(changes);
         self.show();
-        Ok(())
     }
 
     /// Publishes what a station that has told nothing yet says, but for what was told before; a window is told again only where
@@ -460,3 +479,6 @@ fn picture(station: &Station) -> Picture {
         settled: station.is_settled(),
     }
 }
+
+#[cfg(test)]
+mod tests;

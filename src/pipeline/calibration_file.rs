@@ -6,10 +6,11 @@ use super::calibration::accuracy::{AxisAccuracy, published};
 use super::calibration::bias_law::BiasFit;
 use super::calibration::scale_factor::{ScaleMeasurement, ScaleSequence};
 use super::calibration::settling::Transient;
-use super::calibration::{Bias, BiasMeasurement, Calibration, Derived, Scale};
+use super::calibration::{Bias, BiasMeasurement, Calibration, Derived, RangeCorrection, Scale};
 use super::files::rounded;
 use super::station::Station;
 use crate::telemetry::{Axis, Range};
+use crate::units::Clock;
 
 /// `calibration.json`.
 pub fn calibration_json(station: &Station) -> Value {
@@ -110,6 +111,18 @@ fn scale_json(scale: &Scale) -> Value {
     json!({"correction": scale.correction, "sigma": scale.sigma, "provenance": scale.provenance.word()})
 }
 
+/// The calibration in use or the one known at an instrument clock, and the ranges that were corrected with it; none where none was known.
+pub fn known_json(station: &Station, known_at: Option<Clock>) -> Option<Value> {
+    let derived = station.derived();
+    let (version, corrections) = match known_at {
+        None => (derived.current()?, derived.range_corrections.clone()),
+        Some(clock) => (derived.as_of(clock)?, station.range_corrections_as_of(clock)),
+    };
+    let mut json = version_json(version);
+    json["range_corrections"] = range_corrections_json(&corrections).into();
+    Some(json)
+}
+
 /// One version of the calibration.
 pub fn version_json(calibration: &Calibration) -> Value {
     let mut axes = Map::new();
@@ -162,11 +175,18 @@ fn corrections_json(derived: &Derived) -> Value {
             "a1_convention": convention,
         },
         "settling": derived.estimated.as_ref().and_then(|c| c.settling.as_ref()).is_some(),
-        "ranges": derived.range_corrections.iter().map(|c| json!({
+        "ranges": range_corrections_json(&derived.range_corrections),
+    })
+}
+
+fn range_corrections_json(corrections: &[RangeCorrection]) -> Vec<Value> {
+    let correction = |c: &RangeCorrection| {
+        json!({
             "from_clock_s": c.from.seconds(), "to_clock_s": c.to.seconds(), "axis": c.axis.letter(),
             "reported": c.reported.letter(), "actual": c.actual.letter(),
-        })).collect::<Vec<_>>(),
-    })
+        })
+    };
+    corrections.iter().map(correction).collect()
 }
 
 fn time_correlation_json(derived: &Derived) -> Value {

@@ -7,7 +7,7 @@ use std::fmt::Write;
 use serde_json::{Map, Value, json};
 
 use super::calibration::Anomaly;
-pub use super::calibration_file::{calibration_json, version_json};
+pub use super::calibration_file::{calibration_json, known_json, version_json};
 use super::ledger::{Account, PlaybackAccount, SecondSet};
 use super::product::{BodyVector, Product};
 use super::settings::Settings;

@@ -2,7 +2,8 @@
 //!
 //! It never stands in the way of the dump port: between two looks it waits on the hub's head, a slot that holds the latest
 //! number only, so whatever came during a search is one picture afterwards, however much it was. The station is held for
-//! as long as it takes to copy the windows. What it finds lies on the desk for those who ask, and waits at the hub for the one
+//! as long as it takes to count the windows, or to copy them when a search is due; what derives from them derives afterwards, on
+//! threads that derive no products. What it finds lies on the desk for those who ask, and waits at the hub for the one
 //! writer to number, publish and journal it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -13,12 +14,15 @@ use tokio::runtime::Handle;
 use tokio::sync::watch;
 use tokio_util::sync::CancellationToken;
 
+use super::others;
 use crate::diagnose::case::Expectation;
-use crate::diagnose::live::{Live, Milestones, Policy, Report, Seen};
-use crate::diagnose::recorder::usable;
+use crate::diagnose::live::{Live, News, Policy, Report, State, digest, news};
+use crate::diagnose::recorder;
 use crate::hub::desk::Desk;
+use crate::hub::journal::Entry;
 use crate::hub::wire::members;
 use crate::hub::{Body, Hub, Topic};
+use crate::ingest::priority::{SEARCHES_GIVE_WAY, give_way};
 use crate::ingest::writer::SharedStation;
 use crate::units::Clock;
 
@@ -42,6 +46,8 @@ pub struct Diagnosing {
     pub expected: Expectation,
     /// When and how to look.
     pub policy: Policy,
+    /// What an earlier run told of the same inputs.
+    pub earlier: Option<Report>,
     /// Called before every search.
     pub gate: Gate,
     /// Cancelled when it must end; a search under way is given up within a second or so.
@@ -51,33 +57,47 @@ pub struct Diagnosing {
 impl Diagnosing {
     /// Works until it is stopped.
     pub fn run(self, runtime: &Handle) {
-        let Self { station, hub, desk, expected, policy, gate, stop } = self;
-        let case = expected.header.id.clone();
-        let (milestones, mut told_revision) =
-            hub.last_told(Topic::Diagnosis).and_then(|json| earlier(&json)).unwrap_or_default();
-        let mut live = match Live::new(expected, policy, milestones) {
+        let Self { station, hub, desk, expected, policy, earlier, gate, stop } = self;
+        let (case, inputs) = (expected.header.id.clone(), digest(&expected, &policy));
+        let mut live = match Live::new(expected, policy, earlier.as_ref().map(Report::taken_up)) {
             Ok(live) => live,
             Err(error) => {
                 tracing::error!(%error, "no diagnosis runs: the ancillary data defeat the physics");
-                return desk.show(Report::refused(&case, &error));
+                return desk.show(Report::refused(&case, inputs, error.to_string()));
             }
         };
+        let pool = match searchers() {
+            Ok(pool) => pool,
+            Err(error) => {
+                tracing::error!(%error, "no diagnosis runs: there are no threads for its searches");
+                let sentence = format!("There are no threads for searches: {error}");
+                return desk.show(Report::refused(&case, inputs, sentence));
+            }
+        };
+        let mut teller = Teller { hub: hub.clone(), desk, told: earlier };
         let mut head = hub.subscribe();
         let mut is_coming = true;
         while !stop.is_cancelled() {
             head.mark_unchanged();
-            let known = usable(&station.read().expect("no holder panics"));
-            let seen = Seen::from(&known);
-            desk.show(live.report(seen.windows, false));
+            let seen = recorder::seen(&station.read().expect("no holder panics"), live.span_s());
+            teller.tell(live.report(&seen, false));
             if !live.is_due(&seen, is_coming) {
-                is_coming = runtime.block_on(news(&mut head, is_coming, &stop));
+                is_coming = runtime.block_on(something_new(&mut head, is_coming, &stop));
                 continue;
             }
-            desk.show(live.report(seen.windows, true));
+            // Of one moment: the windows that are copied are the ones that are counted.
+            let (seen, taken) = {
+                let station = station.read().expect("no holder panics");
+                let seen = recorder::seen(&station, live.span_s());
+                (seen, recorder::taken(&station, live.span_to_take_s(&seen)))
+            };
+            teller.tell(live.report(&seen, true));
             // A search that panics is one answer less, and nothing else.
             let look = AssertUnwindSafe(|| {
-                gate();
-                live.look(known, &|| stop.is_cancelled())
+                pool.install(|| {
+                    gate();
+                    live.look(seen, taken.recording(), is_coming, &|| stop.is_cancelled())
+                })
             });
             let looked = catch_unwind(look).unwrap_or_else(|_| {
                 tracing::error!(
@@ -88,19 +108,41 @@ impl Diagnosing {
                 true
             });
             if looked {
-                let report = live.report(seen.windows, false);
-                if report.progress.revision != told_revision {
-                    hub.tell(message(&report));
-                    told_revision.clone_from(&report.progress.revision);
-                }
-                desk.show(report);
+                teller.tell(live.report(&seen, false));
             }
         }
     }
 }
 
+/// Tells of the diagnosis: the desk everything, the log and the readers of messages what is new.
+struct Teller {
+    hub: Arc<Hub>,
+    desk: Arc<Desk>,
+    /// What readers of messages know.
+    told: Option<Report>,
+}
+
+impl Teller {
+    fn tell(&mut self, report: Report) {
+        let is_there = !matches!(report.progress.state, State::Collecting | State::Searching);
+        if is_there && report.is_news_after(self.told.as_ref()) {
+            log(&self.hub, &news(self.told.as_ref(), &report));
+            self.hub.tell(message(&report));
+            self.told = Some(report.clone());
+        }
+        self.desk.show(report);
+    }
+}
+
+/// The threads of the searches, who give way to everybody else: what derives products never waits behind a search, as it would where both
+/// share their threads. One processor is left to those who answer.
+fn searchers() -> Result<rayon::ThreadPool, rayon::ThreadPoolBuildError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(others()).thread_name(|n| format!("search-{n}"));
+    pool.start_handler(|_| give_way(SEARCHES_GIVE_WAY)).build()
+}
+
 /// Waits for something new; false when nothing came for a while. Once that is known, it waits for as long as it takes.
-async fn news(head: &mut watch::Receiver<u64>, is_coming: bool, stop: &CancellationToken) -> bool {
+async fn something_new(head: &mut watch::Receiver<u64>, is_coming: bool, stop: &CancellationToken) -> bool {
     let changed = async {
         match is_coming {
             true => tokio::time::timeout(QUIET, head.changed()).await.is_ok(),
@@ -120,19 +162,71 @@ async fn news(head: &mut watch::Receiver<u64>, is_coming: bool, stop: &Cancellat
     }
 }
 
-/// The message on topic `diagnosis`: the report but for its looks, which readers of messages have had.
+/// One line in the log for everything that changed.
+fn log(hub: &Hub, news: &[News]) {
+    let (mission, spacecraft) = (hub.mission(), hub.spacecraft_id());
+    for news in news {
+        match news {
+            News::Alarm { clock_s, verdict } => {
+                tracing::warn!(
+                    mission,
+                    spacecraft,
+                    clock_s,
+                    verdict = verdict.word(),
+                    "diagnosis: the alarm is raised"
+                );
+            }
+            News::AlarmWithdrawn { clock_s } => {
+                tracing::warn!(mission, spacecraft, clock_s, "diagnosis: the alarm is withdrawn");
+            }
+            News::Name { clock_s, name } => {
+                tracing::warn!(
+                    mission,
+                    spacecraft,
+                    clock_s,
+                    name = name.join(" + "),
+                    "diagnosis: what is missing has a name"
+                );
+            }
+            News::NameWithdrawn { clock_s, name } => {
+                tracing::warn!(
+                    mission,
+                    spacecraft,
+                    clock_s,
+                    name = name.join(" + "),
+                    "diagnosis: the name is withdrawn"
+                );
+            }
+            News::Refused { sentence } => {
+                tracing::warn!(mission, spacecraft, sentence, "diagnosis: refused");
+            }
+            News::Beyond { windows } => {
+                tracing::warn!(
+                    mission,
+                    spacecraft,
+                    windows,
+                    "diagnosis: windows come that are beyond what they are compared with"
+                );
+            }
+        }
+    }
+}
+
+/// The message on topic `diagnosis`: the report with its last look alone, for readers of messages have had those before.
 fn message(report: &Report) -> Body {
     let mut report = report.clone();
-    report.progress.looks.clear();
+    let looks = &mut report.progress.looks;
+    looks.drain(..looks.len().saturating_sub(1));
     let clock_s = report.progress.last_clock_s.unwrap_or_default();
     let clock = Clock::from_tenths((clock_s * 10.0).round() as i64);
     Body::Told { topic: Topic::Diagnosis, clock, json: members("diagnosis", &report) }
 }
 
-/// Milestones and revision of a message told by an earlier run.
-fn earlier(json: &str) -> Option<(Milestones, String)> {
-    let value: serde_json::Value = serde_json::from_str(&format!("{{{json}}}")).ok()?;
-    let progress = value.get("progress")?;
-    let revision = progress.get("revision")?.as_str()?.to_string();
-    Some((serde_json::from_value(progress.clone()).ok()?, revision))
+/// What earlier runs told of the same inputs, out of the journal.
+pub fn earlier(journal: &[Entry], expected: &Expectation, policy: &Policy) -> Option<Report> {
+    let told = journal.iter().filter_map(|entry| match entry {
+        Entry::Told { topic: Topic::Diagnosis, json, .. } => Some(format!("{{{json}}}")),
+        _ => None,
+    });
+    Report::kept(&expected.header.id, digest(expected, policy), told)
 }

@@ -47,10 +47,8 @@ async fn every_named_route_answers_and_is_described() {
     let described = |path: &str, status: &str| {
         openapi["paths"][path]["get"]["responses"][status]["content"]["application/problem+json"].is_object()
     };
-    for (path, has_parameters) in
-        [("/accel", false), ("/accel/history", true), ("/accel/live", true), ("/calibration", true), ("/gaps", false)]
-    {
-        assert_eq!(described(path, "400"), has_parameters, "{path}");
+    for path in ["/accel", "/accel/history", "/accel/live", "/calibration", "/gaps"] {
+        assert!(described(path, "400"), "{path}");
         assert!(described(path, "401") && described(path, "414"), "{path}");
     }
     assert!(!described("/healthz", "401") && !described("/readyz", "401"));
@@ -129,12 +127,41 @@ async fn parameters_that_make_no_sense_are_named() {
         ("/accel/live?topics=weather", "weather"),
         ("/accel/live?from=seq:x", "seq:x"),
         ("/accel/live?from=seq:99999", "99999"),
+        // One that there is not, and those that there are.
+        ("/calibration?asof=4", "`asof` is no parameter of /calibration, which has `as_of` alone"),
+        ("/accel/history?max_point=4", "`from`, `to`, `max_points`"),
+        ("/accel/live?from=now&topic=diagnosis", "`topic` is no parameter of /accel/live, which has `from`, `topics`"),
+        ("/diagnosis?as_of=400000", "which has none"),
+        ("/accel?as_of=400000", "`as_of`"),
+        ("/events?from=400000", "`from`"),
+        ("/status?x", "`x`"),
+        ("/openapi.json?x=1", "`x`"),
+        ("/calibration?as_of=1&as_of=2", "`as_of` is given more than once"),
     ];
     for (path, named) in cases {
         let (status, problem) = running.problem(path).await;
         assert_eq!(status, 400, "{path}");
         assert!(problem["detail"].as_str().unwrap().contains(named), "{path}: {problem}");
     }
+    assert_eq!(running.get("/status?access_token=whatever").await["phase"], "running");
+}
+
+/// What was known is asked again with everything that products were made with.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_calibration_of_the_past_comes_with_the_ranges_corrected_then() {
+    let Some(folder) = shared_data("dumps") else { return };
+    let running = start().await;
+    running.send(&std::fs::read(folder.join("defects-24h.dump")).unwrap()).await;
+    running.wait_for_playbacks(1).await;
+    let now = running.get("/calibration").await;
+    let corrected = now["range_corrections"].as_array().unwrap();
+    assert!(!corrected.is_empty(), "{now:#}");
+    assert!(corrected.iter().all(|c| c["reported"] == "C" && c["actual"] == "A"), "{corrected:?}");
+    let latest = running.get("/status").await["ingest"]["latest_clock_s"].as_f64().unwrap();
+    assert_eq!(running.get(&format!("/calibration?as_of={latest}")).await, now);
+    let from_s = corrected[0]["from_clock_s"].as_f64().unwrap();
+    let before = running.get(&format!("/calibration?as_of={}", from_s - 100.0)).await;
+    assert_eq!(before["range_corrections"].as_array().map(Vec::len), Some(0), "{before:#}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -8,9 +8,12 @@ use std::sync::{Arc, Condvar, Mutex, OnceLock};
 use std::time::Instant;
 
 use oare_ground::config::Config;
+use oare_ground::diagnose::{self, recorder};
 use oare_ground::ingest::wire::LinkConfig;
+use oare_ground::math::shared_work;
 use oare_ground::physics::Vec3;
 use oare_ground::service::Service;
+use oare_ground::service::diagnosing::Gate;
 use oare_ground::simulate::expected::case_files;
 use oare_ground::simulate::forces::Push;
 use oare_ground::simulate::noise::NoisePlan;
@@ -58,9 +61,14 @@ fn write_case(folder: &Path) {
 
 /// The `[diagnosis]` of a case in the directory of a service.
 fn with_case(config: &mut Config) {
+    with_case_and(config, "");
+}
+
+/// The same with more lines.
+fn with_case_and(config: &mut Config, lines: &str) {
     write_case(&config.data_dir.join("case"));
-    let text = "[diagnosis]\ncase = \"case\"\n";
-    config.diagnosis = Config::from_toml_in(text, &config.data_dir).unwrap().diagnosis;
+    let text = format!("[diagnosis]\ncase = \"case\"\n{lines}");
+    config.diagnosis = Config::from_toml_in(&text, &config.data_dir).unwrap().diagnosis;
 }
 
 impl Running {
@@ -77,19 +85,22 @@ impl Running {
         }
     }
 
-    /// Waits until every window known is in the answer.
+    /// The value of a metric, named with its labels.
+    async fn metric(&self, name: &str) -> f64 {
+        let text = reqwest::get(self.url("/metrics")).await.unwrap().text().await.unwrap();
+        let value = text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' ')?.parse().ok());
+        value.unwrap_or_else(|| panic!("{name} is not in: {text}"))
+    }
+
+    /// Waits until every usable window that the station has is in the answer, more than so many.
     async fn settled(&self, windows_min: u64) -> Value {
-        let all = |d: &Value| {
-            let p = &d["progress"];
-            p["state"] == "current" && p["windows_searched"].as_u64() > Some(windows_min)
+        let is_whole = |d: &Value| {
+            let (p, there) =
+                (&d["progress"], recorder::seen(&self.service.station.read().unwrap(), recorder::ALL_TIME));
+            let is_known = p["windows_seen"] == there.windows && p["windows_searched"].as_u64() > Some(windows_min);
+            is_known && p["at_rest"] == true
         };
-        let known = self.wait_for_diagnosis("an answer", all).await;
-        // The windows after the last calibration come with the flush; what comes later is looked at when it is quiet.
-        let seen = known["progress"]["windows_seen"].as_u64().unwrap();
-        self.wait_for_diagnosis("an answer to all windows", |d| {
-            d["progress"]["state"] == "current" && d["progress"]["windows_seen"].as_u64() >= Some(seen)
-        })
-        .await
+        self.wait_for_diagnosis("an answer to all windows", is_whole).await
     }
 }
 
@@ -98,7 +109,8 @@ async fn a_concealed_leak_is_named_as_the_windows_come_and_everybody_is_told() {
     let [first, second] = &mission().0;
     let running = start_with(with_case).await;
     let waiting = running.get("/diagnosis").await;
-    assert_eq!((&waiting["verdict"], &waiting["progress"]["state"]), (&"consistent".into(), &"collecting".into()));
+    assert_eq!((&waiting["verdict"], &waiting["false_alarm_probability"]), (&Value::Null, &Value::Null));
+    assert_eq!(waiting["progress"]["state"], "collecting");
     let mut live = running.live("topics=diagnosis").await;
     assert_eq!(live.next().await.unwrap()["type"], "hello");
 
@@ -136,21 +148,131 @@ async fn a_concealed_leak_is_named_as_the_windows_come_and_everybody_is_told() {
     assert_eq!(told["effects"][0]["id"], "vent_leak");
     assert_eq!(told["progress"]["revision"].as_str().map(str::len), Some(16));
 
-    // After a restart: the same answer, the milestones as they were, and nothing told twice.
+    // After a restart the answer and what led to it are there before the first search; that finds the same, and nothing is told twice.
     let settled = running.settled(0).await;
     let Running { service, dir } = running;
     service.drain().await.unwrap();
     let mut again = config(&dir);
     with_case(&mut again);
-    let running = Running { service: Service::start(again).await.unwrap(), dir };
+    let held = Arc::new(Held::default());
+    let running = Running { service: Service::start_gated(again, held.gate()).await.unwrap(), dir };
     let head = running.service.hub.head_seq();
+    let at_once = running.get("/diagnosis").await;
+    assert_eq!((&at_once["verdict"], &at_once["progress"]["state"]), (&"explained".into(), &"searching".into()));
+    for same in ["alarm_clock_s", "name_clock_s", "revision", "windows_searched", "searches", "looks", "inputs"] {
+        assert_eq!(at_once["progress"][same], settled["progress"][same], "{same}");
+    }
+    assert!(settled["progress"]["looks"].as_array().unwrap().len() > 1, "{settled:#}");
+    assert_eq!(running.metric("oare_diagnosis_alarm").await, 1.0);
+    held.release();
     let restarted = running.settled(0).await;
-    assert_eq!(restarted["effects"][0]["id"], "vent_leak");
-    for same in ["alarm_clock_s", "name_clock_s", "revision", "windows_searched"] {
+    for same in ["effects", "located", "verdict"] {
+        assert_eq!(restarted[same], settled[same], "{same}");
+    }
+    for same in ["alarm_clock_s", "name_clock_s", "revision", "windows_searched", "searches"] {
         assert_eq!(restarted["progress"][same], settled["progress"][same], "{same}");
     }
     tokio::time::sleep(std::time::Duration::from_millis(300)).await;
     assert_eq!(running.service.hub.head_seq(), head, "a restart tells nothing new");
+
+    // Of another vehicle nothing is inherited.
+    let Running { service, dir } = running;
+    service.drain().await.unwrap();
+    let mut other = config(&dir);
+    with_case_and(&mut other, "set = [\"vehicle.mass_kg=104500\"]\n");
+    let held = Arc::new(Held::default());
+    let running = Running { service: Service::start_gated(other, held.gate()).await.unwrap(), dir };
+    let anew = running.get("/diagnosis").await;
+    let progress = &anew["progress"];
+    assert_eq!((&anew["verdict"], &progress["alarm_clock_s"]), (&Value::Null, &Value::Null), "{anew:#}");
+    assert_eq!((&progress["searches"], progress.get("looks")), (&0.into(), None), "{progress:#}");
+    assert_eq!(running.metric("oare_diagnosis_alarm").await, 0.0);
+    held.release();
+    running.service.drain().await.unwrap();
+}
+
+/// Once nothing more comes the answer is one of the windows alone: what came before, and where the searches fell, leaves no trace.
+#[tokio::test(flavor = "multi_thread")]
+async fn at_rest_the_answer_is_the_same_whatever_came_before() {
+    let [first, second] = &mission().0;
+    let mut answers = Vec::new();
+    for (is_apart, playbacks) in [(true, [first, second]), (false, [second, first])] {
+        let running = start_with(with_case).await;
+        for (n, playback) in (1..).zip(playbacks) {
+            running.send(playback).await;
+            running.wait_for_playbacks(n).await;
+            if is_apart {
+                running.wait_for_diagnosis("a search", |d| d["progress"]["searches"].as_u64() > Some(0)).await;
+            }
+        }
+        let mut answer = running.settled(800).await;
+        answer.as_object_mut().unwrap().remove("progress").unwrap();
+        answers.push(serde_json::to_string(&answer).unwrap());
+        running.service.drain().await.unwrap();
+    }
+    assert_eq!(answers[0], answers[1]);
+    // It is that of `oare diagnose`, but for the level of proof.
+    let file = |name: &str| {
+        let text = mission().1.iter().find(|(file, _)| *file == name).map(|(_, text)| text.clone().into_bytes());
+        Ok(text.or_else(|| (name == "recording.dump").then(|| [&first[..], second].concat())))
+    };
+    let case = recorder::case(file, &[]).unwrap();
+    let alone = serde_json::to_value(diagnose::diagnose(&case, &diagnose::Settings::default()).unwrap()).unwrap();
+    let answer: Value = serde_json::from_str(&answers[0]).unwrap();
+    for same in ["case", "verdict", "statistic", "effects", "located", "fit", "upper_limits"] {
+        assert_eq!(answer[same], alone[same], "{same}");
+    }
+}
+
+/// Nobody believes that windows are watched which the simulation does not reach, and those it reaches are not searched for them again.
+#[tokio::test(flavor = "multi_thread")]
+async fn windows_beyond_the_simulation_are_told_and_cause_no_search() {
+    let [first, second] = &mission().0;
+    let running = start_with(|config| {
+        with_case_and(config, "set = [\"case.end_s=40000.0\"]\n");
+    })
+    .await;
+    running.send(first).await;
+    let before = running.settled(200).await;
+    let progress = &before["progress"];
+    let (end_s, beyond) = (progress["last_clock_s"].as_f64().unwrap(), progress["windows_beyond"].as_u64().unwrap());
+    assert!(end_s <= 40_000.0 && beyond > 0, "{progress:#}");
+    let sentence = progress["sentence"].as_str().unwrap();
+    assert!(sentence.contains(&format!("{beyond} of")) && sentence.contains("to 40000 s"), "{sentence}");
+    let mut live = running.live("topics=diagnosis").await;
+    live.next().await.unwrap();
+    running.send(second).await;
+    let is_known = |d: &Value| d["progress"]["windows_beyond"].as_u64() > Some(beyond + 500);
+    running.wait_for_diagnosis("windows beyond", is_known).await;
+    let after = running.settled(200).await;
+    for same in ["windows_searched", "last_clock_s"] {
+        assert_eq!(after["progress"][same], before["progress"][same], "{same}");
+    }
+    // The second tape has calibrations that bear on the windows before; its 800 windows would be twelve searches.
+    let searches = |d: &Value| d["progress"]["searches"].as_u64().unwrap();
+    assert!(searches(&after) <= searches(&before) + 4, "{after:#}");
+    running.service.drain().await.unwrap();
+}
+
+/// A comparison that cannot be made says so everywhere, and nobody can take it for "all is well".
+#[tokio::test(flavor = "multi_thread")]
+async fn windows_that_cannot_be_compared_have_no_verdict() {
+    let running = start_with(|config| {
+        with_case_and(config, "set = [\"case.start_s=9000000.0\", \"case.end_s=9100000.0\"]\n");
+    })
+    .await;
+    let mut live = running.live("topics=diagnosis").await;
+    live.next().await.unwrap();
+    running.send(&mission().0[0]).await;
+    let refused = running.wait_for_diagnosis("a refusal", |d| d["progress"]["state"] == "refused").await;
+    assert_eq!((&refused["verdict"], &refused["false_alarm_probability"]), (&Value::Null, &Value::Null), "{refused:#}");
+    assert!(refused["progress"]["sentence"].as_str().unwrap().contains("9100000"), "{refused:#}");
+    let told = live.next().await.unwrap();
+    assert_eq!((&told["verdict"], &told["progress"]["state"]), (&Value::Null, &"refused".into()), "{told:#}");
+    assert_eq!(running.get("/status").await["diagnosis"]["state"], "refused");
+    for (state, is_here) in [("refused", 1.0), ("current", 0.0), ("collecting", 0.0)] {
+        assert_eq!(running.metric(&format!("oare_diagnosis_state{{state=\"{state}\"}}")).await, is_here, "{state}");
+    }
     running.service.drain().await.unwrap();
 }
 
@@ -161,6 +283,21 @@ struct Held {
     moved: Condvar,
 }
 
+impl Held {
+    fn gate(self: &Arc<Self>) -> Gate {
+        let held = self.clone();
+        Arc::new(move || {
+            let open = held.open.lock().unwrap();
+            drop(held.moved.wait_while(open, |open| !*open).unwrap());
+        })
+    }
+
+    fn release(&self) {
+        *self.open.lock().unwrap() = true;
+        self.moved.notify_all();
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_search_that_does_not_end_delays_no_window_and_what_came_meanwhile_is_one_search_more() {
     let [first, second] = &mission().0;
@@ -168,12 +305,10 @@ async fn a_search_that_does_not_end_delays_no_window_and_what_came_meanwhile_is_
     let dir = tempfile::tempdir().unwrap();
     let mut config = config(&dir);
     with_case(&mut config);
-    let gate = held.clone();
-    let wait = move || {
-        let open = gate.open.lock().unwrap();
-        drop(gate.moved.wait_while(open, |open| !*open).unwrap());
-    };
-    let running = Running { service: Service::start_gated(config, Arc::new(wait)).await.unwrap(), dir };
+    // It holds every thread that a search may have, and products are derived all the same.
+    let gate = held.gate();
+    let on_all_threads = move || drop(shared_work::map(&[(); 64], |()| gate()));
+    let running = Running { service: Service::start_gated(config, Arc::new(on_all_threads)).await.unwrap(), dir };
     running.send(first).await;
     running.wait_for_diagnosis("a search", |d| d["progress"]["state"] == "searching").await;
 
@@ -189,8 +324,7 @@ async fn a_search_that_does_not_end_delays_no_window_and_what_came_meanwhile_is_
     let meanwhile = running.get("/diagnosis").await;
     assert_eq!((&meanwhile["progress"]["state"], &meanwhile["progress"]["searches"]), (&"searching".into(), &0.into()));
 
-    *held.open.lock().unwrap() = true;
-    held.moved.notify_all();
+    held.release();
     let named = running.wait_for_diagnosis("a name", |d| d["verdict"] == "explained").await;
     assert_eq!(named["progress"]["searches"], 2, "the one that was held, and one for all that came since: {named:#}");
     running.service.drain().await.unwrap();
@@ -209,7 +343,7 @@ async fn a_search_that_fails_is_told_and_the_next_one_answers() {
     let running = Running { service: Service::start_gated(config, Arc::new(gate)).await.unwrap(), dir };
     running.send(first).await;
     let failed = running.wait_for_diagnosis("a failure", |d| d["progress"]["state"] == "failed").await;
-    assert_eq!((&failed["verdict"], &failed["progress"]["searches"]), (&"consistent".into(), &0.into()), "{failed:#}");
+    assert_eq!((&failed["verdict"], &failed["progress"]["searches"]), (&Value::Null, &0.into()), "{failed:#}");
     assert!(failed["progress"]["sentence"].as_str().unwrap().contains("failed"), "{failed:#}");
     assert!(running.first_accel().await["clock_s"].as_f64().is_some());
     fails.store(false, Ordering::SeqCst);
@@ -258,4 +392,26 @@ fn what_is_wrong_with_the_diagnosis_is_told_whole_with_exit_code_2() {
     ] {
         assert!(contents.contains(word), "{word} is not in: {contents}");
     }
+    // Simulation and ancillary data alone: whatever is missing of the vehicle is told at once, and what is there is enough.
+    write_case(dir.path());
+    let files = "[diagnosis]\nsimulation = \"simulation.csv\"\nancillary = \"ancillary.csv\"\n";
+    let alone = told(files);
+    for word in ["4 faults", "diagnosis.set", "vehicle.mass_kg", "drag_coefficient", "area_m2", "sensor_offset_m"] {
+        assert!(alone.contains(word), "{word} is not in: {alone}");
+    }
+    let vehicle = "\"vehicle.mass_kg=104500\", \"vehicle.drag_coefficient=2.2\", \"vehicle.area_m2=[64.1, 255.0, 367.0]\", \
+                   \"vehicle.sensor_offset_m=[-1.5, 0.1, 0.6]\"";
+    let config = Config::from_toml_in(&format!("{files}set = [{vehicle}]\n"), dir.path()).unwrap();
+    config.diagnosis.unwrap().expectation(&config.settings.time).unwrap();
+    // Each sentence names what the operator wrote.
+    for (set, word) in
+        [("vehicle.mass_kg", "key=value"), ("vehicle.mas_kg=5", "vehicle.mas_kg"), ("vehicle.mass_kg=-5", "positive")]
+    {
+        let said = told(&format!("[diagnosis]\ncase = \".\"\nset = [\"{set}\"]\n"));
+        assert!(said.contains("diagnosis.set") && said.contains(word), "{said}");
+    }
+    let csv = told("[diagnosis]\ncase = \"simulation.csv\"\n");
+    assert!(csv.contains("simulation.csv: ") && !csv.contains("case.toml"), "{csv}");
+    let orbits = told("[diagnosis]\ncase = \".\"\nset = [\"recording.kind=orbit_sp3\"]\n");
+    assert!(orbits.contains("1 fault") && orbits.contains("orbit_sp3"), "{orbits}");
 }

@@ -68,10 +68,15 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Non-test lines without comments.
+/// Non-test lines without comments: up to the module of tests that stands in the file itself. One that is declared alone ends nothing.
 fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let end = text.find("#[cfg(test)]").unwrap_or(text.len());
-    text[..end].lines().enumerate().map(|(n, line)| (n + 1, line.split("//").next().unwrap_or("")))
+    let lines: Vec<&str> = text.lines().map(|line| line.split("//").next().unwrap_or("")).collect();
+    let opens_tests = |n: &usize| {
+        let next = lines.get(n + 1).map_or("", |line| line.trim());
+        lines[*n].trim() == "#[cfg(test)]" && next.starts_with("mod ") && next.ends_with('{')
+    };
+    let end = (0..lines.len()).find(opens_tests).unwrap_or(lines.len());
+    lines.into_iter().take(end).enumerate().map(|(n, line)| (n + 1, line))
 }
 
 /// The crate paths a line names: `pipeline::product` of `crate::pipeline::product::Product`.
@@ -98,6 +103,9 @@ fn rooms_use_only_rooms_before_them_and_pure_rooms_touch_nothing_outside() {
         let room = room_of(&name);
         let text = fs::read_to_string(&file).unwrap();
         for (number, line) in code(&text) {
+            if line.contains("crate::{") {
+                faults.push(format!("{name}:{number} names several rooms at once, which nobody can check"));
+            }
             for path in crate_paths(line) {
                 if room_of(path) > room {
                     faults.push(format!("{name}:{number} uses {path}"));
@@ -110,4 +118,13 @@ fn rooms_use_only_rooms_before_them_and_pure_rooms_touch_nothing_outside() {
         }
     }
     assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn a_file_is_read_to_its_own_tests_whatever_is_declared_before() {
+    let text = "use a;\n#[cfg(test)]\nmod tests;\n#[cfg(test)]\nfn made() {}\nuse crate::api; // tokio\n#[cfg(test)]\nmod tests {\n    x\n}\n";
+    let read: Vec<_> = code(text).collect();
+    assert_eq!(read.len(), 6);
+    assert_eq!(read[5], (6, "use crate::api; "));
+    assert_eq!(crate_paths(read[5].1), ["api"]);
 }

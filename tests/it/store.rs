@@ -313,6 +313,27 @@ async fn kill_and_restart(dumps: &[Vec<u8>], kills: u32, within_s: f64, seed: u6
     assert_eq!(products(&rebuild(&log, &settings).unwrap()), expected);
 }
 
+/// A service that can take nothing more says so, and ends as failed.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_writer_that_ends_before_its_time_is_told_and_the_service_has_failed() {
+    let running = start().await;
+    running.wait_for("a start", |status| status["phase"] == "running").await;
+    let station = running.service.station.clone();
+    let holder = std::thread::spawn(move || {
+        let _held = station.write().unwrap();
+        panic!("a panic on purpose, with the station held");
+    });
+    holder.join().unwrap_err();
+    tokio::time::timeout(PATIENCE, running.service.failed()).await.expect("the failure is told");
+    let (status, problem) = running.problem("/readyz").await;
+    assert_eq!(status, 503);
+    assert!(problem["detail"].as_str().unwrap().contains("the writer ended"), "{problem}");
+    let status = running.get("/status").await;
+    assert_eq!(status["phase"], "stuck");
+    let failure = running.service.drain().await.unwrap_err().to_string();
+    assert!(failure.contains("panicked"), "{failure}");
+}
+
 /// Frames of one identity that differ by the thousand, as from an instrument that was switched on again: who comes late finds the same.
 #[tokio::test(flavor = "multi_thread")]
 async fn two_recordings_of_the_same_counts_end_as_if_taken_at_once() {

@@ -205,9 +205,9 @@ async function refreshDiagnosis() {
   byId("diagnosis").hidden = !answer;
   if (!answer) return;
   const p = answer.progress, kinds = { consistent: "good", explained: "bad", ambiguous: "wait", unexplained: "bad" };
-  const said = !p || p.windows_searched > 0;
-  chip("verdict", said ? answer.verdict : p.state, said ? kinds[answer.verdict] : "");
-  byId("verdict").dataset.verdict = answer.verdict;
+  const said = answer.verdict !== null;
+  chip("verdict", said ? answer.verdict : p.state, said ? kinds[answer.verdict] : p.state === "refused" ? "wait" : "");
+  byId("verdict").dataset.verdict = answer.verdict ?? "";
   byId("diagnosis-sentence").textContent = p ? p.sentence : "";
   const list = answer.effects.flatMap((e) => e.parameters.map((q, n) =>
     [[n ? "" : e.name, q.name.replaceAll("_", " "), `${significant(q.value)} ± ${significant(q.sigma)} ${q.unit === "1" ? "" : q.unit}`]]));
@@ -216,9 +216,11 @@ async function refreshDiagnosis() {
   if (!p) return;
   const parts = [`${p.windows_searched.toLocaleString("en")} of ${p.windows_seen.toLocaleString("en")} usable windows looked at`];
   if (p.last_clock_s !== null) parts.push(`as of MET ${clockText(p.last_clock_s - liftoffClockS)}`);
-  const since = p.counted_from === "onset" ? "after its onset" : "after the first data";
-  if (p.time_to_detect_s !== null) parts.push(`alarm ${spanText(p.time_to_detect_s)} ${since}`);
-  if (p.time_to_name_s !== null) parts.push(`named ${spanText(p.time_to_name_s)} ${since}`);
+  const since = { onset: "after its onset", logged_start: "after its start in the log" }[p.counted_from] ?? "after the first data";
+  const atOnce = (came) => came ? " (of a playback that came at once)" : "";
+  if (p.time_to_detect_s !== null) parts.push(`alarm ${spanText(p.time_to_detect_s)} ${since}${atOnce(p.alarm_came_at_once)}`);
+  if (p.time_to_name_s !== null) parts.push(`named ${spanText(p.time_to_name_s)} ${since}${atOnce(p.name_came_at_once)}`);
+  if (p.windows_beyond) parts.push(`${p.windows_beyond.toLocaleString("en")} windows are beyond the simulation`);
   if (p.alarms_withdrawn) parts.push(`${p.alarms_withdrawn} alarm(s) withdrawn`);
   if (p.searches_failed) parts.push(`${p.searches_failed} search(es) failed`);
   if (p.state === "searching") parts.push("a search is under way");

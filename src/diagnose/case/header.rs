@@ -114,8 +114,16 @@ impl Vehicle {
     }
 }
 
+/// What must be said of the vehicle, each with an example.
+pub const NEEDED: [(&str, &str); 4] = [
+    ("vehicle.mass_kg", "104500"),
+    ("vehicle.drag_coefficient", "2.2"),
+    ("vehicle.area_m2", "[64.1, 255.0, 367.0]"),
+    ("vehicle.sensor_offset_m", "[-1.5, 0.1, 0.6]"),
+];
+
 /// The keys of a case of accelerations.
-const KEYS: [&str; 16] = [
+pub const KEYS: [&str; 16] = [
     "case.id",
     "case.epoch_utc",
     "case.liftoff_clock_s",

@@ -13,7 +13,7 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 pub use fitted_law::FittedLaw;
-pub use header::{Files, Header, Vehicle};
+pub use header::{Files, Header, KEYS, NEEDED, Vehicle};
 pub use spikes::SPIKE;
 
 use super::error::CaseError;

@@ -3,6 +3,9 @@
 use super::{Effect, SELDOM_LARGE, Shape, lasting, no_density, one_point, push};
 use crate::diagnose::scene::Scene;
 
+/// Entries of the log that it lasts as long as.
+pub const KIND: &str = "evaporator";
+
 /// The entry.
 pub const EFFECT: Effect = Effect {
     id: "evaporator_venting",
@@ -23,7 +26,7 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    lasting(scene, "evaporator").map(Shape::scalar)
+    lasting(scene, KIND).map(Shape::scalar)
 }
 
 #[cfg(test)]

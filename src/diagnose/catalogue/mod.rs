@@ -364,6 +364,15 @@ pub fn in_sensor(scene: &Scene, at: impl Fn(&[f64]) -> Vec<f64>) -> Shape {
     Shape::Columns((0..3).map(column).collect())
 }
 
+/// The kind of entries in the log that an effect acts by, and by nothing else.
+pub fn logged_kind(id: &str) -> Option<&'static str> {
+    match id {
+        "water_dump" => Some(water_dump::KIND),
+        "evaporator_venting" => Some(evaporator_venting::KIND),
+        _ => None,
+    }
+}
+
 /// The series of a push that lasts while an entry of the kind does, if the log has it inside the record: entries that overlap
 /// are one push.
 pub fn lasting(scene: &Scene, kind: &str) -> Option<Vec<f64>> {

@@ -3,6 +3,9 @@
 use super::{Effect, SELDOM_LARGE, Shape, lasting, no_density, one_point, push};
 use crate::diagnose::scene::Scene;
 
+/// Entries of the log that it lasts as long as.
+pub const KIND: &str = "water_dump";
+
 /// The entry.
 pub const EFFECT: Effect = Effect {
     id: "water_dump",
@@ -23,7 +26,7 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    lasting(scene, "water_dump").map(Shape::scalar)
+    lasting(scene, KIND).map(Shape::scalar)
 }
 
 #[cfg(test)]
