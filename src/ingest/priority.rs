@@ -4,8 +4,8 @@
 /// Niceness of what makes products: decoding, the writer, the recording. A tenth of the weight of those who ask, who are few and brief;
 /// enough to go on beside a machine that is busy otherwise.
 pub const PRODUCTS_GIVE_WAY: i32 = 10;
-/// Niceness of the searches of the running diagnosis: a third of that again.
-pub const SEARCHES_GIVE_WAY: i32 = 15;
+/// Niceness of the searches of the running diagnosis: two thirds of the weight of products, so that on a busy machine they too go on.
+pub const SEARCHES_GIVE_WAY: i32 = 12;
 
 /// Lowers the priority of this thread to a niceness. Where the system has no priority of single threads, all stay equal.
 #[cfg(target_os = "linux")]
