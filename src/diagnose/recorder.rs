@@ -273,25 +273,7 @@ pub fn recorded(dump: &[u8], header: &Header) -> Recording {
     let time = MissionTime { epoch_utc: header.epoch_utc, liftoff_clock_s: header.liftoff_clock_s };
     let settings = Settings { time, ..Settings::sts65() };
     let station = replay(&settings, None, |station| take(station, &settings, dump));
-    let mut recording = taken(&station, ALL_TIME).recording();
-    recording.notes.extend(of_another_epoch(&station, &time));
-    recording
-}
-
-/// The Orbiter's clock is set to UTC: beyond a minute it is another epoch, s.
-const EPOCH_OFF_S: f64 = 60.0;
-
-/// Records whose own UTC is not that of the clock with the epoch of the case: Sun and shadow would be those of another day.
-fn of_another_epoch(station: &Station, time: &MissionTime) -> Option<String> {
-    let piece = station.derived().time_correlation.pieces.first()?;
-    let expected_s = time.epoch_utc.as_duration().as_secs_f64();
-    let off_s = piece.offset_s - expected_s;
-    (off_s.abs() > EPOCH_OFF_S).then(|| {
-        format!(
-            "the records themselves have UTC {off_s:+.0} s from that of case.epoch_utc: Sun, shadow and geomagnetic field are those of \
-             the latter"
-        )
-    })
+    taken(&station, ALL_TIME).recording()
 }
 
 fn take(station: &mut Station, settings: &Settings, dump: &[u8]) {

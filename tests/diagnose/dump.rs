@@ -115,3 +115,17 @@ fn of_a_step_of_the_bias_the_windows_keep_what_the_law_does_not_take() {
         assert!(away < 0.1 * rms(&|i| found[i] - whole[i]).max(10.0), "axis {body}: {away}");
     }
 }
+
+/// The records carry UTC of their own: an epoch of another year in `case.toml` is told, since Sun and shadow are by it.
+#[test]
+fn an_epoch_that_is_not_that_of_the_records_is_told() {
+    let mut files = files(8.0, Vec::new());
+    let told = |files: &[(String, Vec<u8>)]| {
+        let found = diagnose(&super::case(files), &Settings::default()).unwrap();
+        found.notes.iter().filter(|note| note.contains("own UTC is -31536000 s from that of `epoch_utc`")).count()
+    };
+    assert_eq!(told(&files), 0);
+    let (_, octets) = files.iter_mut().find(|(name, _)| name == "case.toml").unwrap();
+    *octets = String::from_utf8(octets.clone()).unwrap().replace("1994-07-", "1995-07-").into_bytes();
+    assert_eq!(told(&files), 1);
+}

@@ -145,6 +145,8 @@ fn planted(kind: AnomalyKind, seed: u64) -> MissionConfig {
             config.faults.push(Fault::BiasOutlier { calibration_id, counts });
         }
         AnomalyKind::OneSidedTrim => config.one_sided_on_board = true,
+        // No fault of the instrument, but of who reads its records.
+        AnomalyKind::EpochMismatch => config.time.epoch_utc += jiff::SignedDuration::from_hours(24),
     }
     config
 }

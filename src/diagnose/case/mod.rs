@@ -59,8 +59,6 @@ pub struct Recording {
     pub bias_laws: [Vec<FittedLaw>; 3],
     /// What was wrong with the instrument, as far as its own dump tells.
     pub faults: Vec<Fault>,
-    /// What else its records tell against the case.
-    pub notes: Vec<String>,
 }
 
 /// A fault of the instrument that the calibration found in a dump.
@@ -347,7 +345,6 @@ fn take(recording: &Recording, keep: &[usize]) -> Recording {
         bias_errors_ng: recording.bias_errors_ng.each_ref().map(|axis| axis.iter().map(pick).collect()),
         bias_laws: recording.bias_laws.each_ref().map(|axis| axis.iter().map(|law| law.at(keep)).collect()),
         faults: recording.faults.clone(),
-        notes: recording.notes.clone(),
     }
 }
 

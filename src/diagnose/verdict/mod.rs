@@ -248,7 +248,6 @@ fn of_windows(scene: &Scene) -> Vec<String> {
     let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
     let in_holes = scene.case.windows_in_holes;
     let mut notes = Vec::new();
-    notes.extend(scene.case.recording.notes.iter().cloned());
     let beyond = scene.case.windows_beyond;
     if beyond > 0 {
         notes.push(format!(

@@ -26,6 +26,8 @@ pub enum AnomalyKind {
     TableJitter,
     /// A bias measurement far from the law.
     BiasOutlier,
+    /// The records' own UTC is not that of the epoch they are read with.
+    EpochMismatch,
 }
 
 impl AnomalyKind {
@@ -41,13 +43,14 @@ impl AnomalyKind {
             Self::Saturation => "saturation",
             Self::TableJitter => "table_jitter",
             Self::BiasOutlier => "bias_outlier",
+            Self::EpochMismatch => "epoch_mismatch",
         }
     }
 }
 
 /// False anomalies that chance may tell, per mission, over all kinds.
 pub const FALSE_PER_MISSION: f64 = 1e-3;
-/// Kinds that share them: all but the estimator, which is compared bit for bit.
+/// Kinds that share them: all but the estimator, which is compared bit for bit, and the epoch, which no chance moves by a minute.
 const KINDS: f64 = 8.0;
 
 /// Standard errors beyond which a level shift is told after so many scale sequences: its kind's share of the false anomalies

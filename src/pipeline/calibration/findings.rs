@@ -4,10 +4,11 @@ use super::anomaly::{Anomaly, AnomalyKind};
 use super::one_sided::OneSided;
 use super::scale_factor::{Refusal, ScaleSequence};
 use super::settling::Transient;
-use super::time_correlation::ClockJump;
+use super::time_correlation::{ClockJump, TimeCorrelation};
 use super::two_position::BiasMeasurement;
 use super::version::Shift;
 use crate::telemetry::{Axis, Range};
+use crate::units::MissionTime;
 
 fn capital(axis: Axis) -> String {
     axis.letter().to_uppercase()
@@ -79,6 +80,29 @@ pub(super) fn clock_jump(jump: &ClockJump) -> Anomaly {
             jump.jump_s
         ),
     }
+}
+
+/// The Orbiter's clock is set to UTC: by more it is another epoch, s.
+const EPOCH_OFF_S: f64 = 60.0;
+
+/// Records read with an epoch that is not theirs.
+pub(super) fn epoch(correlation: &TimeCorrelation, time: &MissionTime) -> Option<Anomaly> {
+    let piece = correlation.pieces.first()?;
+    let off_s = piece.offset_s - time.epoch_utc.as_duration().as_secs_f64();
+    (off_s.abs() > EPOCH_OFF_S).then(|| Anomaly {
+        kind: AnomalyKind::EpochMismatch,
+        from: piece.span[0],
+        to: piece.span[1],
+        axes: Vec::new(),
+        value: off_s,
+        sigma: piece.offset_sigma_s,
+        unit: "s",
+        sentence: format!(
+            "The records' own UTC is {off_s:+.0} s from that of `epoch_utc` ({}): all UTC told here, and Sun, shadow and geomagnetic field, \
+             are by the latter.",
+            time.epoch_utc
+        ),
+    })
 }
 
 /// Scale sequences that cannot be used, but for lost telemetry.

@@ -121,7 +121,7 @@ pub fn derive(
     derived.one_sided = one_sided;
     derived.time_correlation = time_correlation;
     derived.accuracy = Axis::ALL.map(|axis| analyse(axis, &derived));
-    find_anomalies(archive, windows, &mut derived);
+    find_anomalies(archive, windows, settings, &mut derived);
     derived
 }
 
@@ -238,7 +238,7 @@ fn signature(
     hasher.finish()
 }
 
-fn find_anomalies(archive: &Archive, windows: &Windows, derived: &mut Derived) {
+fn find_anomalies(archive: &Archive, windows: &Windows, settings: &Settings, derived: &mut Derived) {
     let mut anomalies = Vec::new();
     let always = Clock::from_tenths(i64::MAX);
     let (misreported, at_rail) = both(
@@ -254,6 +254,7 @@ fn find_anomalies(archive: &Archive, windows: &Windows, derived: &mut Derived) {
     }
     anomalies.extend(findings::one_sided(&derived.one_sided));
     anomalies.extend(derived.time_correlation.jumps.iter().map(findings::clock_jump));
+    anomalies.extend(findings::epoch(&derived.time_correlation, &settings.time));
     let sequences: Vec<ScaleSequence> = derived.scales.iter().map(|(sequence, _)| sequence.clone()).collect();
     anomalies.extend(sequences.iter().filter_map(findings::scale));
     anomalies
