@@ -2,19 +2,21 @@
 //!
 //! The physics along the ancillary data is laid out once; every look measures only what the windows are and searches the whole
 //! catalogue. While more windows come it starts its noise from the look before, so that where the looks fell shows in the last digits;
-//! at rest it does not, and the answer is that of `oare diagnose` on the same windows, but for the level of proof: many looks are many chances, so an alarm needs posterior odds that no number of looks reaches by chance
-//! oftener than is allowed (Ville 1939: an evidence ratio of 1/p is met with probability p at most, however long one waits), and
-//! what remains beside it is charged for the looks before.
+//! at rest it does not, and the answer is that of `oare diagnose` on the same windows, but for the level of proof: many looks are many
+//! chances, so an alarm needs posterior odds that no number of looks reaches by chance oftener than is allowed (Ville 1939: an evidence
+//! ratio of 1/p is met with probability p at most, however long one waits), and what remains beside it is charged for the looks before.
 //!
 //! Not here: threads, clocks, who brings the windows and who is told.
 
 mod inputs;
+mod news;
 mod progress;
 
 use std::sync::Arc;
 
 pub use inputs::digest;
-pub use progress::{CountedFrom, Look, Milestones, News, Progress, Report, State, news};
+pub use news::{News, news};
+pub use progress::{CountedFrom, Look, Milestones, Progress, Report, State};
 use progress::{Found, add, beyond_sentence, digits, waiting_sentence};
 
 use super::answer::{Diagnosis, EffectAnswer, Source};

@@ -80,15 +80,19 @@ pub fn relaxing(grid: &[f64], series: &[f64], tau_s: f64) -> Vec<f64> {
     let mut state = series.first().copied().unwrap_or(0.0);
     for (i, value) in series.iter().enumerate() {
         if i > 0 {
-            let dt = grid[i] - grid[i - 1];
-            let decay = (-dt / tau_s).exp();
-            // Of a ramp over the step, the end counts by `ramp` and the beginning by what is left of the step's own share.
-            let ramp = 1.0 - (1.0 - decay) * tau_s / dt;
-            state = state * decay + value * ramp + series[i - 1] * (1.0 - decay - ramp);
+            state = relaxed(state, [series[i - 1], *value], grid[i] - grid[i - 1], tau_s);
         }
         out.push(state);
     }
     out
+}
+
+/// Where what follows with a time constant comes to from a `state`, while what it follows goes straight `from` one value to another.
+pub fn relaxed(state: f64, [from, to]: [f64; 2], step_s: f64, tau_s: f64) -> f64 {
+    let decay = (-step_s / tau_s).exp();
+    // Of a ramp over the step, its end counts by `ramp` and its beginning by what is left of the step's own share.
+    let ramp = 1.0 - (1.0 - decay) * tau_s / step_s;
+    state * decay + to * ramp + from * (1.0 - decay - ramp)
 }
 
 /// Window means as [`Measurement`] gives them, at any offset of the clock: one that runs ahead by `ahead_s` labels late. From the integral

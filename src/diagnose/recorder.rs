@@ -6,6 +6,7 @@
 //! finding.
 
 use nalgebra::DMatrix;
+use rapidhash::v3::rapidhash_v3;
 
 use super::case::{Case, Fault, FittedLaw, Header, Recording, Texts};
 use super::error::CaseError;
@@ -81,8 +82,8 @@ pub fn seen(station: &Station, span_s: [f64; 2]) -> Seen {
     let mut seen = Seen { calibration: station.calibration().map_or(0, |c| c.version), ..Seen::default() };
     for (window, product, _) in usable_windows(station) {
         if (span_s[0]..=span_s[1]).contains(&window.centre_s()) {
-            // Fowler, Noll and Vo's hash, a revision at a time: the windows come in one order.
-            seen.digest = (seen.digest ^ product.revision.0).wrapping_mul(0x0000_0100_0000_01b3);
+            // A revision at a time: the windows come in one order.
+            seen.digest = rapidhash_v3([seen.digest, product.revision.0].map(u64::to_le_bytes).as_flattened());
             seen.windows += 1;
         } else {
             seen.beyond += 1;

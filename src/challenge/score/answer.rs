@@ -8,7 +8,7 @@ use crate::challenge::conceal::Truth;
 use crate::diagnose::catalogue;
 
 /// An answer, as far as it is scored.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// consistent, explained, ambiguous or unexplained.
     pub verdict: String,
@@ -39,22 +39,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// In place of an answer that there is not.
-    pub(super) fn none() -> Self {
-        Self {
-            verdict: String::new(),
-            false_alarm_probability: None,
-            statistic: None,
-            slow_evidence: None,
-            effects: Vec::new(),
-            alternatives: Vec::new(),
-            cannot_tell_apart: Vec::new(),
-            hypothesis: None,
-            fit: None,
-        }
-    }
-
-    /// Whether it stands in place of one.
+    /// Whether it stands, by its default, in place of an answer that there is not.
     pub(super) fn is_none(&self) -> bool {
         self.verdict.is_empty()
     }

@@ -52,7 +52,7 @@ pub struct Score {
 /// Scores outcomes.
 pub fn score(outcomes: &[Outcome]) -> Score {
     // A case without an answer is no hit in any rate that its truth belongs to.
-    let none = Answer::none();
+    let none = Answer::default();
     let all: Vec<Pair> = outcomes.iter().map(|o| (&o.truth, o.answer.as_ref().unwrap_or(&none))).collect();
     let answered: Vec<Pair> = outcomes.iter().filter_map(|o| Some((&o.truth, o.answer.as_ref().ok()?))).collect();
     let failed =

@@ -1,54 +1,50 @@
 //! A digest of what the windows are compared with: what was found of the same inputs holds after a restart, and of others nothing.
 
+use rapidhash::v3::rapidhash_v3;
+
 use super::Policy;
 use crate::diagnose::case::Expectation;
 
-/// Fowler, Noll and Vo's hash, a word at a time.
-struct Digest(u64);
+/// What is digested, each part with an end that no value has.
+#[derive(Default)]
+struct Octets(Vec<u8>);
 
-impl Digest {
-    fn word(&mut self, word: u64) {
-        self.0 = (self.0 ^ word).wrapping_mul(0x0000_0100_0000_01b3);
-        // What a step leaves in the upper half would never come down again.
-        self.0 ^= self.0 >> 32;
-    }
-
+impl Octets {
     fn numbers<'a>(&mut self, numbers: impl IntoIterator<Item = &'a f64>) {
-        numbers.into_iter().for_each(|number| self.word(number.to_bits()));
-        self.word(u64::MAX);
+        numbers.into_iter().for_each(|number| self.0.extend(number.to_le_bytes()));
+        self.0.extend([u8::MAX; 8]);
     }
 
     fn text(&mut self, text: &str) {
-        text.bytes().for_each(|octet| self.word(u64::from(octet)));
-        self.word(u64::MAX);
+        self.0.extend(text.bytes().chain([u8::MAX]));
     }
 }
 
 /// The digest of simulation, ancillary data, log, case, and of what is searched for and claimed. Where the files lie and how often is
 /// searched are no part of it.
 pub fn digest(expected: &Expectation, policy: &Policy) -> u64 {
-    let mut digest = Digest(0xcbf2_9ce4_8422_2325);
+    let mut octets = Octets::default();
     let (simulation, ancillary, header) = (&expected.simulation, &expected.ancillary, &expected.header);
-    digest.numbers(&simulation.clock_s);
-    simulation.a_ng.iter().for_each(|axis| digest.numbers(axis));
-    digest.numbers(&ancillary.clock_s);
+    octets.numbers(&simulation.clock_s);
+    simulation.a_ng.iter().for_each(|axis| octets.numbers(axis));
+    octets.numbers(&ancillary.clock_s);
     for vectors in [&ancillary.r_m, &ancillary.v_m_s, &ancillary.w_rad_s] {
-        digest.numbers(vectors.iter().flatten());
+        octets.numbers(vectors.iter().flatten());
     }
-    digest.numbers(ancillary.q.iter().flatten());
-    digest.numbers(ancillary.density_kg_m3.iter().chain(&ancillary.temperature_c));
+    octets.numbers(ancillary.q.iter().flatten());
+    octets.numbers(ancillary.density_kg_m3.iter().chain(&ancillary.temperature_c));
     for event in &expected.events {
-        digest.numbers([&event.clock_s, &event.duration_s]);
-        digest.text(&event.kind);
+        octets.numbers([&event.clock_s, &event.duration_s]);
+        octets.text(&event.kind);
     }
     let vehicle = &header.vehicle;
-    digest.numbers([&vehicle.mass_kg, &vehicle.drag_coefficient, &vehicle.srp_coefficient]);
-    digest.numbers(vehicle.area_m2.iter().chain(&vehicle.sensor_offset_m));
-    digest.numbers([&header.liftoff_clock_s, &policy.claim_probability].into_iter().chain(&header.span_s));
-    digest.text(&header.epoch_utc.to_string());
-    digest.text(&header.id);
-    header.includes.iter().chain(&policy.without).for_each(|word| digest.text(word));
-    digest.0
+    octets.numbers([&vehicle.mass_kg, &vehicle.drag_coefficient, &vehicle.srp_coefficient]);
+    octets.numbers(vehicle.area_m2.iter().chain(&vehicle.sensor_offset_m));
+    octets.numbers([&header.liftoff_clock_s, &policy.claim_probability].into_iter().chain(&header.span_s));
+    octets.text(&header.epoch_utc.to_string());
+    octets.text(&header.id);
+    header.includes.iter().chain(&policy.without).for_each(|word| octets.text(word));
+    rapidhash_v3(&octets.0)
 }
 
 #[cfg(test)]

@@ -12,8 +12,8 @@ use super::search::{Level, Problem, SCORE_MIN, UNLISTED_M_S2, covariance, indepe
 const EDGE_EPOCHS: usize = 4;
 /// A velocity step taken before all common terms are known must leave less than this part of the rms.
 const PROVISIONAL: f64 = 0.1;
-/// In any case it must leave less than this part.
-const LEFT_MAX: f64 = 0.2;
+/// In any case what one arc has for itself must leave less than this part.
+pub(super) const LEFT_MAX: f64 = 0.2;
 /// A step is told from an unlisted push that lasts when it is this many times what such a push gains over the arc.
 const UNLISTED_TIMES: f64 = 10.0;
 /// Unknowns of a velocity step.

@@ -6,10 +6,9 @@
 
 use super::arc::ArcFit;
 use super::forces::Term;
+use super::manoeuvre::LEFT_MAX;
 use super::search::{Level, Problem, SCORE_MIN, evidence, with};
 
-/// It must leave less than this part of the rms.
-const LEFT_MAX: f64 = 0.2;
 /// Evidence by which it must be above every other term that would do: twice the logarithm of odds of twenty.
 const MARGIN: f64 = 6.0;
 
@@ -36,6 +35,7 @@ pub fn found(problem: &Problem, level: &Level) -> Vec<Own> {
 fn of_arc(problem: &Problem, level: &Level, i: usize) -> Option<Own> {
     let (arc, fit) = (&problem.arcs[i], &level.fits[i]);
     let was = fit.rms_m(0..arc.fitted);
+    // What the only arc asks for, the search has asked already.
     if problem.arcs.len() == 1 || fit.impulse.is_some() || !was.is_finite() || was <= problem.rms_max_m() {
         return None;
     }

@@ -2,6 +2,7 @@
 //! follows (see `search`).
 
 use super::read::{Axis, Series};
+use crate::diagnose::measure::relaxed;
 
 /// An effect a sensor's series may show.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -164,11 +165,7 @@ fn late(t_s: &[f64], x: &[f64], lag_s: f64) -> Vec<f64> {
     for (i, value) in x.iter().enumerate() {
         if i > 0 {
             let dt = t_s[i] - t_s[i - 1];
-            // Between two means the input goes straight from one to the other.
-            let (decay, before) = ((-dt / lag_s).exp(), x[i - 1]);
-            let ramp = 1.0 - (1.0 - decay) * lag_s / dt;
-            let driven = value * ramp + before * (1.0 - decay - ramp);
-            state = if dt > 4.0 * lag_s { *value } else { state * decay + driven };
+            state = if dt > 4.0 * lag_s { *value } else { relaxed(state, [x[i - 1], *value], dt, lag_s) };
         }
         out.push(state);
     }
