@@ -43,7 +43,10 @@ pub fn digest(expected: &Expectation, policy: &Policy) -> u64 {
     octets.numbers([&header.liftoff_clock_s, &policy.claim_probability].into_iter().chain(&header.span_s));
     octets.text(&header.epoch_utc.to_string());
     octets.text(&header.id);
-    header.includes.iter().chain(&policy.without).for_each(|word| octets.text(word));
+    for words in [&header.includes, &policy.without] {
+        words.iter().for_each(|word| octets.text(word));
+        octets.text("");
+    }
     rapidhash_v3(&octets.0)
 }
 
