@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::design::Frame;
 use super::noise::{self, AxisNoise};
-use super::scene::{Axes, Scene};
+use super::scene::{Measured, Scene};
 use super::search::{self, Bank, Set};
 use super::solve::{Library, Solution, null_noise, solve};
 use crate::math::shared_work;
@@ -78,26 +78,26 @@ impl<'a> Bootstrap<'a> {
 
     /// Whether replicate `index` reaches what is asked about.
     fn reaches(&self, index: usize) -> bool {
-        let residual = self.noise_alone(index);
-        self.first_look(&residual) + REACH >= self.asked && self.searched(residual).statistic() >= self.asked
+        let measured = self.noise_alone(index);
+        self.first_look(&measured) + REACH >= self.asked && self.searched(measured).statistic() >= self.asked
     }
 
     /// The first look at replicate `index`, and all that the search finds in it.
     pub fn look_and_solution(&self, index: usize) -> (f64, Solution) {
-        let residual = self.noise_alone(index);
-        (self.first_look(&residual), self.searched(residual))
+        let measured = self.noise_alone(index);
+        (self.first_look(&measured), self.searched(measured))
     }
 
-    fn searched(&self, residual: Axes) -> Solution {
-        let scene = self.scene.with_residual(residual);
+    fn searched(&self, measured: Measured) -> Solution {
+        let scene = self.scene.with_measured(measured);
         solve(&scene, self.library, null_noise(&scene, Some(&self.noise)))
     }
 
-    fn noise_alone(&self, index: usize) -> Axes {
+    fn noise_alone(&self, index: usize) -> Measured {
         let mut rng =
             rand_chacha::ChaCha8Rng::seed_from_u64(self.seed.wrapping_mul(1_000_003).wrapping_add(index as u64));
         let schedule = &self.scene.schedule;
-        std::array::from_fn(|k| {
+        let residual_ng = std::array::from_fn(|k| {
             let mut normal = || StandardNormal.sample(&mut rng);
             let mut noise = noise::simulate(&self.noise[k], schedule, &self.scene.loudness[k], &mut normal);
             for error in &schedule.shared_ng[k] {
@@ -105,12 +105,14 @@ impl<'a> Bootstrap<'a> {
                 noise.iter_mut().zip(error).for_each(|(x, error)| *x += size * error);
             }
             noise
-        })
+        });
+        let flips = schedule.flips.each_ref().map(|flips| flips.drawn(|| StandardNormal.sample(&mut rng)));
+        Measured { residual_ng, flips }
     }
 
     /// The best log posterior odds of an entry alone, at the noise of the bootstrap.
-    fn first_look(&self, residual_ng: &Axes) -> f64 {
-        let frame = self.frame.with_data(residual_ng);
+    fn first_look(&self, measured: &Measured) -> f64 {
+        let frame = self.frame.with_measured(measured);
         let nothing = Set::default();
         let chosen = nothing.chosen(&frame);
         let seen = self.bank.before(&frame.data);

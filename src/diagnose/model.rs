@@ -301,7 +301,7 @@ fn member_series(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, mov
     let mut sum = axes::nothing(scene.schedule.len());
     for j in 0..m.linear().max(1) {
         let factor = if m.linear() == 0 { 1.0 } else { mean[first + j] };
-        axes::add_regressor(&mut sum, &columns[m.axis.unwrap_or(j)], factor);
+        axes::add_regressor_and_flips(&mut sum, &columns[m.axis.unwrap_or(j)], factor);
     }
     Some(sum)
 }

@@ -10,7 +10,7 @@ use rapidhash::v3::rapidhash_v3;
 
 use super::case::{Case, Fault, FittedLaw, Header, Recording, Texts};
 use super::error::CaseError;
-use super::noise::dot;
+use super::noise::{Flip, Flips, dot};
 use crate::ingest::wire::{PlaybackPart, PlaybackReader};
 use crate::math::rms::about_mean;
 use crate::pipeline::calibration::{
@@ -22,8 +22,9 @@ use crate::pipeline::{PlaybackId, Product, Settings};
 use crate::telemetry::{Mode, Quality, Range};
 use crate::units::MissionTime;
 
-/// OARE axis of each body axis.
+/// OARE axis of each body axis, and which way it points there.
 const OARE_AXIS: [usize; 3] = [0, 2, 1];
+const OARE_SIGN: [f64; 3] = [1.0, 1.0, -1.0];
 
 /// Which usable windows a station has, without what is in them: enough to know whether there is anything new.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -125,7 +126,7 @@ impl Taken {
         let Self { mut recording, conditions, calibration, measurements } = self;
         if let Some(calibration) = calibration {
             recording.bias_errors_ng = OARE_AXIS.map(|axis| bias_errors(&calibration, axis, &conditions));
-            recording.bias_laws = OARE_AXIS.map(|axis| bias_laws(&calibration, axis, &measurements, &conditions));
+            recording.bias_laws = std::array::from_fn(|k| bias_laws(&calibration, k, &measurements, &conditions));
         }
         recording
     }
@@ -142,8 +143,7 @@ fn bias_errors(calibration: &Calibration, axis: usize, windows: &[Conditions]) -
     let mut errors = Vec::new();
     for range in Range::ALL {
         let Some(fit) = calibration.bias[axis][range.index()].as_ref().and_then(Bias::fit) else { continue };
-        let ng_per_count =
-            calibration.resolution_ng[axis][range.index()] * calibration.scale[axis][range.index()].correction;
+        let ng_per_count = ng_per_count(calibration, axis, range);
         let open = fit.open_errors();
         let at = |(clock_s, temperature_c, ranges): &Conditions| match ranges[axis] == Some(range) {
             true => open(calibration.time.met_h(*clock_s), *temperature_c).map(|counts| counts * ng_per_count),
@@ -155,20 +155,22 @@ fn bias_errors(calibration: &Calibration, axis: usize, windows: &[Conditions]) -
     principal(&errors)
 }
 
-/// The bias laws of an OARE axis at the windows, each with the measurements it was fitted to. From count to count and from nanog to
+/// The bias laws of a body axis at the windows, each with the measurements it was fitted to. From count to count and from nanog to
 /// nanog are the same shares: a law and its measurements are of one range.
 fn bias_laws(
     calibration: &Calibration,
-    axis: usize,
+    body_axis: usize,
     measurements: &[BiasMeasurement],
     windows: &[Conditions],
 ) -> Vec<FittedLaw> {
+    let axis = OARE_AXIS[body_axis];
     let law = |range: Range| {
         let fit = calibration.bias[axis][range.index()].as_ref().and_then(Bias::fit)?;
         if !windows.iter().any(|(_, _, ranges)| ranges[axis] == Some(range)) {
             return None;
         }
-        let of_law = measurements.iter().filter(|m| m.axis.index() == axis && m.range == range);
+        let of_law: Vec<&BiasMeasurement> =
+            measurements.iter().filter(|m| m.axis.index() == axis && m.range == range).collect();
         let gradients: Vec<[f64; PARAMETERS]> = windows
             .iter()
             .map(|(clock_s, temperature_c, ranges)| match ranges[axis] == Some(range) {
@@ -176,13 +178,26 @@ fn bias_laws(
                 false => [0.0; PARAMETERS],
             })
             .collect();
+        let ng = OARE_SIGN[body_axis] * ng_per_count(calibration, axis, range);
+        let flip = |(m, rest_counts): (&&BiasMeasurement, &f64)| Flip {
+            clock_s: m.clock_s,
+            rest_ng: ng * rest_counts,
+            sigma_ng: ng.abs() * m.sigma_counts,
+            gradient_ng: fit.gradient_at(calibration.time.met_h(m.clock_s), m.temperature_c).map(|g| ng * g),
+        };
+        let flips: Vec<Flip> = of_law.iter().zip(&fit.residuals).map(flip).collect();
         Some(FittedLaw {
-            measured_s: of_law.map(|m| m.clock_s).collect(),
+            measured_s: of_law.iter().map(|m| m.clock_s).collect(),
             answers: by_figure(&fit.answers),
             gradients: by_figure(&gradients),
+            flips: Flips::new(&flips, &fit.departures),
         })
     };
     Range::ALL.into_iter().filter_map(law).collect()
+}
+
+fn ng_per_count(calibration: &Calibration, axis: usize, range: Range) -> f64 {
+    calibration.resolution_ng[axis][range.index()] * calibration.scale[axis][range.index()].correction
 }
 
 fn by_figure(rows: &[[f64; PARAMETERS]]) -> Vec<Vec<f64>> {
@@ -296,8 +311,7 @@ fn take(station: &mut Station, settings: &Settings, dump: &[u8]) {
 fn deviation_ng(calibration: &Calibration, window: &Window, product: &Product) -> Option<[f64; 3]> {
     let ng = OARE_AXIS.map(|axis| {
         let (window, range) = (window.axes[axis]?, product.range[axis]?);
-        let ng = calibration.resolution_ng[axis][range.index()] * calibration.scale[axis][range.index()].correction;
-        Some(window.estimate.deviation * ng)
+        Some(window.estimate.deviation * ng_per_count(calibration, axis, range))
     });
     let [Some(x), Some(y), Some(z)] = ng else { return None };
     Some([x, y, z])

@@ -13,7 +13,7 @@ use super::case::{Case, Expectation, HALF_WINDOW_S};
 use super::earlier;
 use super::error::CaseError;
 use super::measure::{Measurement, coverage, union};
-use super::noise::{self, Contradicted, Loudness, Schedule};
+use super::noise::{self, Contradicted, Flips, Loudness, Schedule};
 
 pub use super::axes::Axes;
 
@@ -54,6 +54,14 @@ pub struct Surroundings {
     pub temperature_c: Vec<f64>,
     /// Orbital period, s.
     pub period_s: f64,
+}
+
+/// What was measured: the windows, and the bias beside them.
+pub struct Measured {
+    /// Recording less measured simulation, ng.
+    pub residual_ng: Axes,
+    /// The flips of the table, per axis.
+    pub flips: [Flips; 3],
 }
 
 /// The case, measured and furnished with its physics.
@@ -222,7 +230,9 @@ impl<'a> Scene<'a> {
         let residual_ng: Axes =
             std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
         Self {
-            schedule: Schedule::new(windows).with_shared(case.recording.bias_errors_ng.clone()),
+            schedule: Schedule::new(windows).with_shared(case.recording.bias_errors_ng.clone()).with_flips(
+                case.recording.bias_laws.each_ref().map(|laws| laws.iter().map(|law| &law.flips).collect()),
+            ),
             loudness,
             contradicted: [None; 3],
             residual_ng,
@@ -238,9 +248,10 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// The same scene with another residual: a bootstrap replicate.
-    pub fn with_residual(&self, residual_ng: Axes) -> Self {
-        Self { residual_ng, ..self.clone() }
+    /// The same scene with other measurements, of windows and of the bias: a bootstrap replicate.
+    pub fn with_measured(&self, Measured { residual_ng, flips }: Measured) -> Self {
+        let schedule = self.schedule.clone().with_flips(flips);
+        Self { residual_ng, schedule, ..self.clone() }
     }
 
     /// Window centres.

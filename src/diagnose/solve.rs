@@ -91,9 +91,11 @@ impl Solution {
         self.listed.iter().chain(&self.open).fold(&self.null, |a, b| if better(a, b) { b } else { a })
     }
 
-    /// Log posterior odds of the best hypothesis against nothing.
+    /// Log posterior odds of the best hypothesis against nothing, by the windows: flips of the table choose between hypotheses, and a
+    /// bias that leaves its law in them alone is no mismatch of what was recorded.
     pub fn statistic(&self) -> f64 {
-        let best = self.listed.iter().chain(&self.open).map(|w| w.log_posterior).fold(f64::NEG_INFINITY, f64::max);
+        let by_windows = |w: &Weighed| w.log_posterior - w.of_flips;
+        let best = self.listed.iter().chain(&self.open).map(by_windows).fold(f64::NEG_INFINITY, f64::max);
         best - self.null.log_posterior
     }
 
@@ -112,7 +114,7 @@ impl Solution {
         });
         let energy: f64 = signal.iter().flatten().map(|x| x * x).sum();
         // What the set pays for its sizes, shapes and prior comes off the likelihood it gains, and stays as it is.
-        let paid = (0.5 * energy - best.set.score).max(0.0);
+        let paid = (0.5 * energy - (best.set.score - best.of_flips)).max(0.0);
         statistic - (1.0 - remains::loudness_under(&left, &scene.schedule, &signal).recip()) * (statistic + paid)
     }
 }

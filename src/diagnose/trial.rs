@@ -95,7 +95,10 @@ impl<'a> Trial<'a> {
             for j in 0..m.linear().max(1) {
                 let place = m.axis.unwrap_or(j);
                 let size = (m.linear() > 0).then(|| m.scale * entries[m.entry].usual_size(place));
-                series.push((raws[place].clone(), size));
+                // At the windows alone: a trial is by what they say.
+                let mut raw = raws[place].clone();
+                raw.iter_mut().flatten().for_each(|series| series.truncate(scene.schedule.len()));
+                series.push((raw, size));
             }
         }
         Self { scene, frame, set, noise, signal, series }

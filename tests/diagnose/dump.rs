@@ -113,6 +113,19 @@ fn of_a_step_of_the_bias_the_windows_keep_what_the_law_does_not_take() {
         let away = rms(&|i| found[i] - expected[i]);
         eprintln!("axis {body}: {away:.2} ng rms from the law, {:.2} from the step", rms(&|i| found[i] - whole[i]));
         assert!(away < 0.1 * rms(&|i| found[i] - whole[i]).max(10.0), "axis {body}: {away}");
+        // The flips of the table themselves say how large it is, and without it that it is none.
+        for (recording, size_ng) in [(&with, size_ng), (&without, 0.0)] {
+            for law in &recording.bias_laws[body] {
+                let one: Vec<f64> =
+                    law.measured_s.iter().map(|t| if *t > f64::from(AT_S) { 1.0 } else { 0.0 }).collect();
+                let seen = law.flips.filtered(&one);
+                let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+                let information = product(&seen, &seen);
+                let (found_ng, sigma_ng) = (product(&seen, &law.flips.rest) / information, information.sqrt().recip());
+                eprintln!("axis {body}, {} flips: {found_ng:.1} ± {sigma_ng:.1} ng for {size_ng}", one.len());
+                assert!((found_ng - size_ng).abs() < 3.0 * sigma_ng, "axis {body}: {found_ng} for {size_ng}");
+            }
+        }
     }
 }
 

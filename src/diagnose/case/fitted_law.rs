@@ -1,6 +1,8 @@
 //! What a fitted bias law makes of a bias beside it: its measurements see that bias, the law moves with them as far as its form allows,
 //! and takes that from every window.
 
+use crate::diagnose::noise::Flips;
+
 /// The fitted bias law of one axis and range, about its solution.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct FittedLaw {
@@ -10,6 +12,8 @@ pub struct FittedLaw {
     pub answers: Vec<Vec<f64>>,
     /// What each figure adds to the bias of each window: a row a figure, zero where a window is of another range.
     pub gradients: Vec<Vec<f64>>,
+    /// What its measurements say beside it.
+    pub flips: Flips,
 }
 
 impl FittedLaw {

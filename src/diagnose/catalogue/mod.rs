@@ -349,7 +349,7 @@ pub fn onsets(scene: &Scene, spacing_s: f64, margin_s: f64) -> Vec<f64> {
 }
 
 /// A series born in the sensor, `at` instants: the two-position measurements of a dump see it too, and what the law of the bias then takes
-/// from the windows is no longer in them.
+/// from the windows is no longer in them. Behind its values at the windows are those at the measurements, law by law.
 pub fn in_sensor(scene: &Scene, at: impl Fn(&[f64]) -> Vec<f64>) -> Shape {
     let windows = at(scene.clock_s());
     let laws = &scene.case.recording.bias_laws;
@@ -358,7 +358,9 @@ pub fn in_sensor(scene: &Scene, at: impl Fn(&[f64]) -> Vec<f64>) -> Shape {
     }
     let column = |k: usize| {
         let mut left = windows.clone();
-        laws[k].iter().for_each(|law| law.take_from(&mut left, &at(&law.measured_s)));
+        let measured: Vec<Vec<f64>> = laws[k].iter().map(|law| at(&law.measured_s)).collect();
+        laws[k].iter().zip(&measured).for_each(|(law, measured)| law.take_from(&mut left, measured));
+        left.extend(measured.concat());
         std::array::from_fn(|axis| (axis == k).then(|| left.clone()))
     };
     Shape::Columns((0..3).map(column).collect())

@@ -227,6 +227,16 @@ impl<'a> Chosen<'a> {
         (column.dot(column) - overlap.norm_squared(), column.dot(&self.data) - overlap.dot(&self.reduced))
     }
 
+    /// Log likelihood that the linear columns gain of what flips say, with the coefficients of all the data.
+    pub fn gain_at_flips(&self) -> f64 {
+        let (mean, _) = self.posterior();
+        let columns = || self.columns.iter().zip(&mean);
+        let seen: f64 = columns().map(|(column, size)| size * column.dot_at_flips(&self.data)).sum();
+        let own =
+            |(a, size): (&&Column, &f64)| -> f64 { columns().map(|(b, other)| size * other * a.dot_at_flips(b)).sum() };
+        seen - 0.5 * columns().map(own).sum::<f64>()
+    }
+
     /// Posterior mean and covariance of the scaled coefficients.
     pub fn posterior(&self) -> (DVector<f64>, DMatrix<f64>) {
         match &self.cholesky {

@@ -16,8 +16,8 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 pub use chosen::{Chosen, Normal};
 
-use crate::diagnose::noise::{AxisNoise, Loudness, Schedule, Stretch, Whitener, dot};
-use crate::diagnose::scene::Axes;
+use crate::diagnose::noise::{AxisNoise, Flips, Loudness, Schedule, Stretch, Whitener, dot};
+use crate::diagnose::scene::{Axes, Measured};
 use crate::math::rms::about_mean;
 use crate::math::shared_work;
 
@@ -32,7 +32,20 @@ struct Part {
     whitened: Arc<Vec<f32>>,
     /// Its products with what is nuisance on this axis.
     nuisance: Vec<f64>,
+    /// What flips of the table see of it, behind their filter; empty where they see nothing.
+    flips: Vec<f64>,
     factor: f64,
+}
+
+impl Part {
+    /// The same with a bias at the flips.
+    fn seen_by(self, flips: &Flips, at_flips: Stretch) -> Self {
+        if at_flips.values.is_empty() {
+            return self;
+        }
+        let bias_ng = [&vec![0.0; at_flips.first], at_flips.values].concat();
+        Self { flips: flips.filtered(&bias_ng), ..self }
+    }
 }
 
 /// A whitened regressor, the constant of every axis projected out of every product.
@@ -59,7 +72,14 @@ impl Column {
             let nuisance: f64 = a.nuisance.iter().zip(&b.nuisance).map(|(a, b)| a * b).sum();
             sum += a.factor * b.factor * (product - nuisance);
         }
-        sum
+        sum + self.dot_at_flips(other)
+    }
+
+    /// What flips see of both, as a product.
+    fn dot_at_flips(&self, other: &Column) -> f64 {
+        let parts = self.parts.iter().zip(&other.parts).filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)));
+        let product = |(a, b): (&Part, &Part)| -> f64 { a.flips.iter().zip(&b.flips).map(|(a, b)| a * b).sum() };
+        parts.map(|(a, b)| a.factor * b.factor * product((a, b))).sum()
     }
 
     /// This column times `factor`.
@@ -86,10 +106,12 @@ impl Column {
             };
             let mut whitened = vec![0.0; end - first];
             let mut nuisance = vec![0.0; b.nuisance.len()];
+            let mut flips = vec![0.0; b.flips.len().max(a.as_ref().map_or(0, |a| a.flips.len()))];
             let mut add = |part: &Part, factor: f64| {
                 let values = part.whitened.iter().map(|y| f64::from(*y));
                 whitened[part.first - first..].iter_mut().zip(values).for_each(|(x, y)| *x += factor * y);
                 nuisance.iter_mut().zip(&part.nuisance).for_each(|(x, y)| *x += factor * y);
+                flips.iter_mut().zip(&part.flips).for_each(|(x, y)| *x += factor * y);
             };
             if let Some(a) = &*a {
                 add(a, a.factor);
@@ -99,6 +121,7 @@ impl Column {
                 first,
                 whitened: Arc::new(whitened.iter().map(|x| *x as f32).collect()),
                 nuisance,
+                flips,
                 factor: 1.0,
             });
         }
@@ -149,6 +172,8 @@ pub struct Frame {
     /// What is nuisance on each axis, whitened: the constant, of unit norm, and the errors all windows share, orthogonal to it and to
     /// each other, each as far as the data and not its prior decide it.
     nuisance: Arc<[Vec<Vec<f64>>; 3]>,
+    /// What was measured of the bias beside the windows.
+    flips: Arc<[Flips; 3]>,
     /// Log restricted likelihood but for the data's share.
     log_det: f64,
     /// The whitened residual.
@@ -172,7 +197,29 @@ impl Frame {
             std::iter::once(one).chain(shared).collect()
         });
         let (whiteners, nuisance) = (Arc::new(whiteners), Arc::new(nuisance));
-        Self { whiteners, nuisance, log_det, data: Column::default(), log_null: log_det }.with_data(residual_ng)
+        let flips = Arc::new(schedule.flips.clone());
+        let nothing = Self { whiteners, nuisance, flips, log_det, data: Column::default(), log_null: log_det };
+        nothing.with_data(residual_ng).and_flips(&schedule.flips)
+    }
+
+    /// The same filters, other measurements of windows and bias.
+    pub fn with_measured(&self, measured: &Measured) -> Self {
+        self.with_data(&measured.residual_ng).and_flips(&measured.flips)
+    }
+
+    /// The same data with what flips say.
+    fn and_flips(mut self, flips: &[Flips; 3]) -> Self {
+        for (part, flips) in self.data.parts.iter_mut().flatten().zip(flips) {
+            part.flips.clone_from(&flips.rest);
+        }
+        self.log_null = self.log_det - 0.5 * self.data.dot(&self.data);
+        self
+    }
+
+    /// The same filters before a column.
+    pub fn before(&self, data: Column) -> Self {
+        let log_null = self.log_det - 0.5 * data.dot(&data);
+        Self { data, log_null, ..self.clone() }
     }
 
     /// A residual less the likeliest of the errors that all windows share.
@@ -192,16 +239,15 @@ impl Frame {
         })
     }
 
-    fn windows(&self) -> usize {
+    /// Windows of the record.
+    pub fn windows(&self) -> usize {
         self.nuisance[0][0].len()
     }
 
-    /// The same filters, another residual.
+    /// The same filters, another series at the windows, of which flips see nothing.
     pub fn with_data(&self, residual_ng: &Axes) -> Self {
         // The constant is nuisance, however large: it goes before rounding can make anything of it.
-        let data = self.column(&residual_ng.each_ref().map(|series| Some(about_mean(series))), 1.0);
-        let log_null = self.log_det - 0.5 * data.dot(&data);
-        Self { data, log_null, ..self.clone() }
+        self.before(self.column(&residual_ng.each_ref().map(|series| Some(about_mean(series))), 1.0))
     }
 
     /// Whiten a regressor, scaled by its prior size.
@@ -215,8 +261,9 @@ impl Frame {
         }
         let on_axes = [x, y, z].into_iter().enumerate().filter_map(|(axis, series)| Some((axis, series?)));
         Column::of(on_axes.map(|(axis, series)| {
-            let [whitened] = self.whiteners[axis].whiten_stretches([series]);
-            (axis, self.part(axis, series.first, whitened, size))
+            let (at_windows, at_flips) = series.split_at(self.windows());
+            let [whitened] = self.whiteners[axis].whiten_stretches([at_windows]);
+            (axis, self.part(axis, at_windows.first, whitened, size).seen_by(&self.flips[axis], at_flips))
         }))
     }
 
@@ -227,7 +274,8 @@ impl Frame {
         let mut order: Vec<usize> = (0..flat.len()).collect();
         order.sort_by_key(|i| {
             let OnAxis { axis, series, .. } = flat[*i].1;
-            (axis, series.first, series.values.len())
+            let (at_windows, _) = series.split_at(self.windows());
+            (axis, at_windows.first, at_windows.values.len())
         });
         let groups: Vec<&[usize]> =
             order.chunk_by(|a, b| flat[*a].1.axis == flat[*b].1.axis).flat_map(|axis| axis.chunks(LANES)).collect();
@@ -235,9 +283,13 @@ impl Frame {
             // A group that is not full whitens its first series again in the lanes left over.
             let lanes: [OnAxis; LANES] = std::array::from_fn(|l| flat[group[if l < group.len() { l } else { 0 }]].1);
             let axis = lanes[0].axis;
-            let whitened = self.whiteners[axis].whiten_stretches(lanes.map(|lane| lane.series));
-            let whitened = lanes.into_iter().zip(whitened).take(group.len());
-            whitened.map(|(lane, w)| self.part(axis, lane.series.first, w, lane.size)).collect::<Vec<Part>>()
+            let halves = lanes.map(|lane| lane.series.split_at(self.windows()));
+            let whitened = self.whiteners[axis].whiten_stretches(halves.map(|(at_windows, _)| at_windows));
+            let whitened = lanes.into_iter().zip(halves).zip(whitened).take(group.len());
+            let part = |((lane, (at_windows, at_flips)), w): ((OnAxis, (Stretch, Stretch)), Vec<f32>)| {
+                self.part(axis, at_windows.first, w, lane.size).seen_by(&self.flips[axis], at_flips)
+            };
+            whitened.map(part).collect::<Vec<Part>>()
         });
         let mut columns = vec![Column::default(); many.len()];
         for (i, part) in order.iter().zip(parts.into_iter().flatten()) {
@@ -250,7 +302,7 @@ impl Frame {
     fn part(&self, axis: usize, first: usize, whitened: Vec<f32>, size: f64) -> Part {
         let products = self.nuisance[axis].iter();
         let nuisance = products.map(|u| dot(&whitened, &u[first..first + whitened.len()])).collect();
-        Part { first, whitened: Arc::new(whitened), nuisance, factor: size }
+        Part { first, whitened: Arc::new(whitened), nuisance, flips: Vec::new(), factor: size }
     }
 
     /// Whiten a scalar on one axis.

@@ -13,6 +13,7 @@
 mod binned;
 mod filter;
 mod flicker;
+mod flips;
 mod kalman;
 mod levels;
 mod likelihood;
@@ -24,6 +25,7 @@ mod resonance;
 pub use binned::{BIN_S, Binned};
 pub use filter::Whitener;
 pub use flicker::where_it_may_be_flicker;
+pub use flips::{Flip, Flips};
 pub use levels::{Contradicted, settled};
 pub use loudness::Loudness;
 pub use marginal::{SlowPart, slow_part_marginalised};
@@ -72,6 +74,8 @@ pub struct Schedule {
     overlap: Vec<[f64; 2]>,
     /// Errors that all windows share, per axis: series whose sizes are independent and standard normal, ng.
     pub shared_ng: [Vec<Vec<f64>>; 3],
+    /// What was measured of the bias beside the windows, per axis.
+    pub flips: [Flips; 3],
 }
 
 /// A series at the windows from the first that is not zero to the last.
@@ -89,6 +93,14 @@ impl<'a> Stretch<'a> {
         let first = series.iter().position(|x| *x != 0.0).unwrap_or(series.len());
         let end = series.iter().rposition(|x| *x != 0.0).map_or(first, |i| i + 1);
         Self { first, values: &series[first..end] }
+    }
+
+    /// Its values up to so many, and those behind them, from there on.
+    pub fn split_at(self, windows: usize) -> (Self, Self) {
+        let behind_from = windows.saturating_sub(self.first).min(self.values.len());
+        let (values, behind) = self.values.split_at(behind_from);
+        let first = self.first.min(windows);
+        (Self { first, values }, Self { first: self.first.max(windows) - windows, values: behind })
     }
 
     /// One past its last window.
@@ -118,13 +130,18 @@ impl Schedule {
                 [own, previous]
             })
             .collect();
-        Self { clock_s: clock_s.to_vec(), step_s, overlap, shared_ng: Default::default() }
+        Self { clock_s: clock_s.to_vec(), step_s, overlap, shared_ng: Default::default(), flips: Default::default() }
     }
 
     /// The same with errors that all windows share.
     pub fn with_shared(self, shared_ng: [Vec<Vec<f64>>; 3]) -> Self {
         debug_assert!(shared_ng.iter().flatten().all(|series| series.len() == self.len()), "a value for every window");
         Self { shared_ng, ..self }
+    }
+
+    /// The same with measurements of the bias beside the windows.
+    pub fn with_flips(self, flips: [Flips; 3]) -> Self {
+        Self { flips, ..self }
     }
 
     /// Number of windows.

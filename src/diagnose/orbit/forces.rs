@@ -26,6 +26,22 @@ pub struct Environment {
     pub bodies: SunMoonTable,
     /// Gravity at the epoch.
     pub field: GravityField,
+    /// What else acts.
+    pub finer: Finer,
+}
+
+/// Which finer terms act.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Finer {
+    /// The tide in the solid Earth, with the pull of the body that raises it.
+    pub tide: bool,
+    /// The Earth's relativistic term.
+    pub relativity: bool,
+}
+
+impl Finer {
+    /// All of them, as on every satellite.
+    pub const ALL: Self = Self { tide: true, relativity: true };
 }
 
 impl Environment {
@@ -37,7 +53,7 @@ impl Environment {
         field: GravityField,
     ) -> Result<Self, EarthOrientationError> {
         let rotation = Rotation::new(eop, origin, span_s)?;
-        Ok(Self { rotation, bodies: SunMoonTable::new(origin, span_s), field })
+        Ok(Self { rotation, bodies: SunMoonTable::new(origin, span_s), field, finer: Finer::ALL })
     }
 }
 
@@ -156,8 +172,9 @@ impl Moment {
     pub fn baseline(&self, environment: &Environment, baseline: &Baseline) -> Vector3<f64> {
         let fixed = environment.field.acceleration(&(self.rotation * self.state.r), baseline.degree);
         let known = |sum, term: &Term| sum + self.columns(environment, *term)[0];
-        let newton = self.rotation.tr_mul(&fixed) + self.relativity(environment.field.gm_m3_s2());
-        baseline.known.iter().fold(newton, known)
+        let newton = self.rotation.tr_mul(&fixed);
+        let relativity = environment.finer.relativity.then(|| self.relativity(environment.field.gm_m3_s2()));
+        baseline.known.iter().fold(newton + relativity.unwrap_or_default(), known)
     }
 
     /// A term's acceleration for unit coefficients; unused columns are zero.
@@ -166,8 +183,8 @@ impl Moment {
         let zero = Vector3::zeros();
         let to_sun = (self.bodies.sun_m - r).normalize();
         match term {
-            Term::Sun => [pull_and_tide(r, &self.bodies.sun_m, GM_SUN_M3_S2), zero],
-            Term::Moon => [pull_and_tide(r, &self.bodies.moon_m, GM_MOON_M3_S2), zero],
+            Term::Sun => [pull_and_tide(environment.finer, r, &self.bodies.sun_m, GM_SUN_M3_S2), zero],
+            Term::Moon => [pull_and_tide(environment.finer, r, &self.bodies.moon_m, GM_MOON_M3_S2), zero],
             Term::DegreesFrom(from) => {
                 let field = &environment.field;
                 let fixed = field.acceleration_of_degrees(&(self.rotation * r), from, field.degree());
@@ -217,8 +234,9 @@ pub fn sunlit(r_m: &Vector3<f64>, bodies: &SunMoon) -> f64 {
 }
 
 /// What a distant body does to a satellite: its own pull, and that of the tide it raises in the solid Earth.
-fn pull_and_tide(r_m: &Vector3<f64>, body_m: &Vector3<f64>, gm_m3_s2: f64) -> Vector3<f64> {
-    third_body_acceleration(r_m, body_m, gm_m3_s2) + solid_tide_acceleration(r_m, body_m, gm_m3_s2)
+fn pull_and_tide(finer: Finer, r_m: &Vector3<f64>, body_m: &Vector3<f64>, gm_m3_s2: f64) -> Vector3<f64> {
+    let tide = finer.tide.then(|| solid_tide_acceleration(r_m, body_m, gm_m3_s2));
+    third_body_acceleration(r_m, body_m, gm_m3_s2) + tide.unwrap_or_default()
 }
 
 fn panel_axis(r_m: &Vector3<f64>, to_sun: &Vector3<f64>) -> Vector3<f64> {

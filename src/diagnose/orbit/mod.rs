@@ -1,6 +1,7 @@
 //! Precise orbits against a list of forces: what is missing from the list, per satellite and for all.
 
 pub mod arc;
+pub mod finer;
 pub mod forces;
 pub mod held_out;
 pub mod manoeuvre;
@@ -92,7 +93,7 @@ pub enum OrbitError {
 
 /// Analyse an orbit case.
 pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
-    let problem = problem(case, files)?;
+    let problem = finer::settled(problem(case, files)?);
     let search = problem.search(&mut |_| ());
     Ok((report::answer(&case.id, &problem, &search), report::plates(&problem, &search)))
 }

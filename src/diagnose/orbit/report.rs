@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::arc::{Arc, ArcFit};
-use super::forces::Term;
+use super::forces::{Finer, Term};
 use super::held_out::missed_m;
 use super::manoeuvre::Manoeuvre;
 use super::own::Own;
@@ -409,12 +409,31 @@ fn located(problem: &Problem, search: &Search, arcs: &[ArcAnswer], nothing: bool
     }
 }
 
+fn finer(Finer { tide, relativity }: Finer) -> &'static str {
+    match (tide, relativity) {
+        (true, true) => {
+            "The pull of Sun and Moon includes the tide they raise in the solid Earth; the Earth's relativistic term is in."
+        }
+        (true, false) => {
+            "The recording has no relativistic term, as every satellite has: a computed orbit, it seems. The pull of Sun and Moon \
+             includes the tide they raise in the solid Earth; the relativistic term is left out here too."
+        }
+        (false, true) => {
+            "The recording has no tide of the solid Earth, as every satellite feels: a computed orbit, it seems. It is left out here too; \
+             the Earth's relativistic term is in."
+        }
+        (false, false) => {
+            "The recording has neither the tide of the solid Earth nor the Earth's relativistic term, as every satellite has: a computed \
+             orbit, it seems. Both are left out here too."
+        }
+    }
+}
+
 fn notes(problem: &Problem, arcs: &[ArcAnswer]) -> Vec<String> {
     let mut notes = vec![
         "The initial state of every arc, and the coefficients of radiation terms that the simulation includes, are estimated with it."
             .to_owned(),
-        "The pull of Sun and Moon includes the tide they raise in the solid Earth; the Earth's relativistic term is always in."
-            .to_owned(),
+        finer(problem.environment.finer).to_owned(),
     ];
     let masked: usize = problem.arcs.iter().map(|arc| arc.masked).sum();
     if masked > 0 {

@@ -4,6 +4,7 @@
 //! a = s T K (u - u0 - b), K = diag(1 + k), T upper triangular with the three small angles: positive where two sensing axes make less
 //! than a right one. The common scale s is a nuisance.
 
+pub mod blunder;
 pub mod still;
 #[cfg(test)]
 mod tests;
@@ -11,7 +12,9 @@ mod tests;
 use std::collections::BTreeMap;
 
 use nalgebra::{DMatrix, DVector, Dyn, Owned, Vector3};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use self::blunder::{Blunder, without_blunders};
 use self::still::{Pose, find_poses};
 use crate::diagnose::answer::{LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::keys::texts;
@@ -31,6 +34,8 @@ const NEAR_ZERO: f64 = 0.3;
 /// Poses needed beyond the unknowns of a model that is tried.
 const SPARE_POSES: usize = 4;
 const POSES_MIN: usize = 9;
+/// Chance at or below which a scatter of the poses is called a mismatch.
+const CLAIM: f64 = 0.002;
 
 /// A part of the sensor's model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -97,6 +102,8 @@ pub struct Triad {
     covariance: DMatrix<f64>,
     /// |a| - g for every pose fitted, m/s^2.
     pub residuals: Vec<f64>,
+    /// Share of its own misfit that every pose takes by being fitted.
+    leverages: Vec<f64>,
 }
 
 impl Triad {
@@ -230,7 +237,15 @@ pub fn fit(parts: &[Part], poses: &[Pose], gravity: f64) -> Triad {
     let inverse =
         slopes.tr_mul(&slopes).try_inverse().unwrap_or_else(|| DMatrix::from_diagonal_element(n, n, f64::MAX));
     let scale = solved.unknowns[0].exp();
-    Triad { parts: parts.to_vec(), scale, unknowns: solved.unknowns, covariance: inverse * variance, residuals }
+    let leverages = slopes.row_iter().map(|row| (row * &inverse * row.transpose())[0]).collect();
+    Triad {
+        leverages,
+        parts: parts.to_vec(),
+        scale,
+        unknowns: solved.unknowns,
+        covariance: inverse * variance,
+        residuals,
+    }
 }
 
 /// Parts found, with the evidence for each, and the fits on the way.
@@ -295,14 +310,14 @@ fn evidence(before: &Triad, after: &Triad, set: &[Part]) -> f64 {
 /// Analyse a case of static poses.
 pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
     let gravity = gravity(case)?;
-    let poses = poses(case, files)?;
+    let (poses, blunders) = without_blunders(poses(case, files)?, gravity);
     let found = search(&included(case)?, &poses, gravity);
     let added = std::iter::once("as it stands").chain(found.added.iter().map(|(part, _)| part.id()));
     let plate = PosesPlate {
         added: added.map(str::to_owned).collect(),
         residuals: found.fits.iter().map(|fit| fit.residuals.clone()).collect(),
     };
-    Ok((answer(case, &poses, gravity, &found), Plates::Poses(plate)))
+    Ok((answer(case, &poses, &blunders, gravity, &found), Plates::Poses(plate)))
 }
 
 /// The size of gravity where the poses were held, m/s^2.
@@ -395,11 +410,12 @@ fn effect(case: &MeasuredCase, fit: &Triad, part: Part, score: f64, [was, is]: [
     Effect { id, name, posterior: posterior(score), parameters, axis, from_degree: None, why, rms: vec![fit.rms()] }
 }
 
-fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> Answer {
+fn answer(case: &MeasuredCase, poses: &[Pose], blunders: &[Blunder], gravity: f64, found: &Found) -> Answer {
     let (first, last) = (&found.fits[0], &found.fits[found.fits.len() - 1]);
     // One reading's own scatter: poses that disagree by more than that hold something the model lacks.
     let reading = poses.iter().map(|p| p.scatter).sum::<f64>() / poses.len() as f64 * last.scale;
-    let verdict = match (found.added.is_empty(), last.rms() > reading) {
+    let chance = chance(last, reading);
+    let verdict = match (found.added.is_empty(), last.rms() > reading && chance <= CLAIM) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::Consistent,
         (false, false) => Verdict::Explained,
@@ -443,16 +459,18 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
         rms_after: last.rms(),
         predicted_rms: Some(after),
         fitted: poses.len(),
-        masked: 0,
+        masked: blunders.len(),
         note: None,
     };
     Answer {
         schema: "oare.diagnosis/1".to_owned(),
         case: case.id.clone(),
         verdict,
-        false_alarm_probability: (-0.5 * found.added.last().map_or(found.refused, |a| a.1))
-            .exp()
-            .clamp(LEAST_PROBABILITY, 1.0),
+        false_alarm_probability: match verdict {
+            Verdict::Unexplained => chance,
+            _ => (-0.5 * found.added.last().map_or(found.refused, |a| a.1)).exp(),
+        }
+        .clamp(LEAST_PROBABILITY, 1.0),
         located: Located::default(),
         effects,
         alternatives: Vec::new(),
@@ -464,11 +482,30 @@ fn answer(case: &MeasuredCase, poses: &[Pose], gravity: f64, found: &Found) -> A
         cannot_tell_apart: Vec::new(),
         arcs: vec![arc],
         steps: found.fits.iter().enumerate().map(step).collect(),
-        notes: vec![format!(
-            "{} static poses were found (a pose that was knocked and lay as before counts once); the common scale is estimated with every model.",
-            poses.len()
-        )],
+        notes: notes(poses, blunders),
     }
+}
+
+fn notes(poses: &[Pose], blunders: &[Blunder]) -> Vec<String> {
+    let found = format!(
+        "{} static poses were found (a pose that was knocked and lay as before counts once); the common scale is estimated with every model.",
+        poses.len() + blunders.len()
+    );
+    let left_out = blunders.iter().map(|Blunder { pose, off_m_s2 }| {
+        format!(
+            "The pose from {:.1} to {:.1} s is left out: its acceleration is off gravity by {off_m_s2:.4} m/s^2, which no model of the triad \
+             that fits the others gives.",
+            pose.start_s, pose.end_s
+        )
+    });
+    std::iter::once(found).chain(left_out).collect()
+}
+
+/// The chance that poses scatter as they do about a model if each is as well known as one of its readings.
+fn chance(fit: &Triad, reading: f64) -> f64 {
+    let free = fit.residuals.len() as f64 - fit.unknowns.len() as f64;
+    let chi2: f64 = fit.residuals.iter().map(|r| (r / reading).powi(2)).sum();
+    ChiSquared::new(free).map_or(1.0, |law| law.sf(chi2))
 }
 
 /// By how much every pose is missed by what is fitted to half of them, the other half, m/s^2.

@@ -209,6 +209,16 @@ impl Set {
         (&scale * mean, &scale * covariance * &scale)
     }
 
+    /// Member `i` with its coefficients at this noise, whitened: at the windows, and what flips see of it.
+    pub fn whitened(&self, i: usize, frame: &Frame) -> Column {
+        let (mean, _) = self.chosen(frame).posterior();
+        let first: usize = self.members[..i].iter().map(Member::linear).sum();
+        let point = &self.members[i].point;
+        let times = |j: usize| if point.fixed { 1.0 } else { mean[first + j] };
+        let columns = point.columns.iter().enumerate();
+        columns.fold(Column::default(), |sum, (j, column)| sum.less(column, -times(j)))
+    }
+
     /// The series of every member at the windows, ng, with the coefficients at this noise.
     pub fn contributions(&self, scene: &Scene, frame: &Frame, entries: &[Entry]) -> Vec<Axes> {
         let (mean, _) = self.coefficients(frame, entries);

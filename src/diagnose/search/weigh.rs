@@ -17,6 +17,8 @@ pub struct Weighed {
     pub log_posterior: f64,
     /// Log likelihood of slow noise in its residual above that of hardly any.
     pub slow_evidence: f64,
+    /// What of the log posterior flips of the table gave it, and no window did.
+    pub of_flips: f64,
 }
 
 /// What a set leaves at the windows.
@@ -99,5 +101,7 @@ pub fn weigh_with_own_noise(
         + noise.iter().map(noise::log_prior_but_slow).sum::<f64>()
         + slow.above_fit
         + flicker;
-    Weighed { set, noise, log_posterior, slow_evidence: slow.above_none }
+    let has_flips = scene.schedule.flips.iter().any(|flips| !flips.rest.is_empty());
+    let of_flips = if has_flips { set.chosen(&frame).gain_at_flips().max(0.0) } else { 0.0 };
+    Weighed { set, noise, log_posterior, slow_evidence: slow.above_none, of_flips }
 }

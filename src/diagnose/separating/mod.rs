@@ -203,7 +203,7 @@ impl Contest {
                     let slope = slope(scene, part, coefficients, j, p.step, turned, &here.sum);
                     columns.extend(slope.map(|raw| frame.column(&raw, THETA_STEPS * p.step)));
                 }
-                axes::add(&mut sum, &here.sum, 1.0);
+                axes::add_regressor_and_flips(&mut sum, &here.sum.map(Some), 1.0);
             }
             predicted.push(sum);
             free.push(columns);
@@ -245,7 +245,7 @@ fn contribution(
     let columns: Vec<Raw> = shape.columns().into_iter().map(|raw| seen_by_sensor(raw, part.effect, turned)).collect();
     let mut sum = axes::nothing(scene.schedule.len());
     for (j, raw) in columns.iter().enumerate() {
-        axes::add_regressor(&mut sum, raw, if is_fixed { 1.0 } else { coefficients[j] });
+        axes::add_regressor_and_flips(&mut sum, raw, if is_fixed { 1.0 } else { coefficients[j] });
     }
     Some(Contribution { columns, is_fixed, sum })
 }
@@ -285,7 +285,7 @@ fn fly(scene: &Scene, noise: &[AxisNoise; 3], sets: &[Fitted], now: &Contest, ca
         std::array::from_fn(|k| {
             let series: Vec<f64> = then.predicted[a][k].iter().zip(&then.predicted[b][k]).map(|(x, y)| x - y).collect();
             let before = series[..first].iter().sum::<f64>() / first as f64;
-            let new = &series[first..];
+            let new = &series[first..ahead.schedule.len()];
             (new.iter().map(|d| (d - before).powi(2)).sum::<f64>() / new.len().max(1) as f64).sqrt()
         })
     };

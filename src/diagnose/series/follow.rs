@@ -11,6 +11,8 @@ pub enum Follows {
     Temperature(usize, f64),
     /// A temperature as it was so many seconds before.
     Delayed(usize, f64),
+    /// A component of the magnetic field (index of the covariate), at once: a sensor feels no field of an hour ago.
+    Field(usize),
     /// Exponential decay with this time constant in seconds from the start of the data.
     Drift(f64),
     /// A step at this time, s.
@@ -30,6 +32,8 @@ pub enum Form {
     Linear,
     /// To the square of its deviation from its mean.
     Square,
+    /// To the third power of that.
+    Cube,
 }
 
 impl Follows {
@@ -37,6 +41,7 @@ impl Follows {
     pub fn id(&self) -> &'static str {
         match self {
             Self::Temperature(..) | Self::Delayed(..) => "temperature_bias",
+            Self::Field(_) => "magnetic_sensitivity",
             Self::Drift(_) => "bias_drift",
             Self::Step(_) => "bias_step",
             Self::Scale => "scale_factor",
@@ -49,6 +54,7 @@ impl Follows {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Temperature(..) | Self::Delayed(..) => "A bias that follows temperature",
+            Self::Field(_) => "A sensor that feels the magnetic field",
             Self::Drift(_) => "A decaying bias",
             Self::Step(_) => "A step of the bias",
             Self::Scale => "A scale factor against the reference",
@@ -59,7 +65,19 @@ impl Follows {
 
     /// How many unknowns it is charged for: its coefficient, and what was looked for beside it.
     pub fn price(&self) -> f64 {
-        if matches!(self, Self::Temperature(_, 0.0) | Self::Form(.., 0.0) | Self::Scale) { 1.0 } else { 2.0 }
+        if matches!(self, Self::Temperature(_, 0.0) | Self::Form(.., 0.0) | Self::Field(_) | Self::Scale) {
+            1.0
+        } else {
+            2.0
+        }
+    }
+
+    /// Whether one of them leaves no room for the other in a model: two components of a field do.
+    pub fn excludes(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Field(one), Self::Field(other)) => one == other,
+            _ => self.id() == other.id(),
+        }
     }
 
     /// The number that does not enter linearly: a time constant or an instant.
@@ -71,7 +89,7 @@ impl Follows {
             | Self::Step(s)
             | Self::Offset(s)
             | Self::Form(.., s) => Some(s),
-            Self::Scale => None,
+            Self::Scale | Self::Field(_) => None,
         }
     }
 
@@ -93,23 +111,31 @@ impl Follows {
             Self::Drift(_) => Self::Drift(s),
             Self::Step(_) => Self::Step(s),
             Self::Offset(_) => Self::Offset(s),
-            Self::Scale => Self::Scale,
+            Self::Scale | Self::Field(_) => self,
         }
     }
 }
 
 impl Form {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Linear, Self::Square];
+    pub const ALL: [Self; 3] = [Self::Linear, Self::Square, Self::Cube];
+
+    fn exponent(self) -> i32 {
+        match self {
+            Self::Linear => 1,
+            Self::Square => 2,
+            Self::Cube => 3,
+        }
+    }
 
     fn of(self, values: &[f64]) -> Vec<f64> {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
-        values.iter().map(|x| if self == Self::Square { (x - mean).powi(2) } else { x - mean }).collect()
+        values.iter().map(|x| (x - mean).powi(self.exponent())).collect()
     }
 
     /// Its power, as it is written behind what is raised to it.
     pub fn power(self) -> &'static str {
-        if self == Self::Square { "^2" } else { "" }
+        ["", "^2", "^3"][self as usize]
     }
 
     /// As a formula of a covariate.
@@ -146,6 +172,7 @@ pub fn equation(series: &Series, axis: &Axis, model: &[Follows]) -> Equation {
     let column = |follows: &Follows| match follows {
         Follows::Temperature(k, lag_s) => late(t, &series.covariates[*k].values, *lag_s),
         Follows::Delayed(k, lag_s) => t.iter().map(|now| at(t, &series.covariates[*k].values, now - lag_s)).collect(),
+        Follows::Field(k) => series.covariates[*k].values.clone(),
         Follows::Form(form, k, lag_s) => late(t, &form.of(&series.covariates[*k].values), *lag_s),
         Follows::Drift(tau_s) => t.iter().map(|t| (-(t - series.t_s[0]) / tau_s).exp()).collect(),
         Follows::Step(at_s) => t.iter().map(|t| f64::from(u8::from(t >= at_s))).collect(),

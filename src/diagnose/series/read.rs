@@ -59,6 +59,17 @@ impl CovariateSeries {
         let unit: String = self.unit.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
         matches!(unit.as_str(), "c" | "degc" | "celsius" | "k" | "degk" | "kelvin" | "f" | "degf" | "fahrenheit")
     }
+
+    /// Whether it is a component of a magnetic field.
+    pub fn is_magnetic(&self) -> bool {
+        matches!(self.unit.as_str(), "T" | "mT" | "uT" | "\u{b5}T" | "\u{3bc}T" | "nT" | "G" | "mG" | "gauss")
+    }
+
+    /// Its component, by the end of its name, or all of that.
+    pub fn component(&self) -> &str {
+        let end = self.name.rsplit(['_', '-', '.', ' ']).next().unwrap_or_default();
+        if matches!(end, "x" | "y" | "z" | "X" | "Y" | "Z") { end } else { &self.name }
+    }
 }
 
 /// The series as block means.

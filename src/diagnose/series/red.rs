@@ -1,4 +1,5 @@
-//! A series in red noise: a slow wander (first-order Gauss-Markov) beside white noise, both estimated.
+//! A series in red noise: a slow wander beside white noise, both estimated. The wander is a first-order Gauss-Markov process, or flicker
+//! noise, a sum of such processes of all memories.
 //!
 //! The wander is a competitor of every effect: what a slow covariate explains must be explained better than a wander does
 //! it. It also sets the standard errors: a covariance is averaged over every wander that the data allow, each with the
@@ -10,11 +11,15 @@ use nalgebra::{DMatrix, DVector};
 const MEMORIES: [f64; 9] = [0.5, 2.0, 5.0, 12.0, 30.0, 75.0, 180.0, 450.0, 1_100.0];
 /// White variance over that of the wander.
 const WHITES: [f64; 8] = [0.0, 0.002, 0.01, 0.04, 0.15, 0.6, 3.0, 15.0];
+/// Of flicker noise, by their place above: six times as long from one to the next.
+const RUNGS: [usize; 5] = [0, 1, 3, 5, 7];
+/// Variance of each rung over that of the one before: as much for flicker noise, more on the way to a random walk.
+const TILTS: [f64; 2] = [1.0, 2.5];
 
-/// Times of the samples, in units of their usual spacing.
+/// Times of the samples, in units of their usual spacing, as the correlation of every wander from each sample to the next.
 #[derive(Debug, Clone, Default)]
 pub struct Beat {
-    steps: Vec<f64>,
+    correlations: [Vec<f64>; MEMORIES.len()],
 }
 
 impl Beat {
@@ -24,21 +29,44 @@ impl Beat {
         let mut sorted = steps.clone();
         sorted.sort_by(f64::total_cmp);
         let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0).max(1e-12);
-        Self { steps: steps.iter().map(|s| s / usual).collect() }
+        let correlation = |memory: f64| steps.iter().map(|step| (-step / usual / memory).exp()).collect();
+        Self { correlations: MEMORIES.map(correlation) }
+    }
+}
+
+/// A wander of unit variance: processes by their place among the memories, and their shares.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Wander {
+    One(usize),
+    Flicker(f64),
+}
+
+impl Wander {
+    fn all() -> impl Iterator<Item = Self> {
+        (0..MEMORIES.len()).map(Self::One).chain(TILTS.into_iter().map(Self::Flicker))
     }
 
-    /// Correlation of the wander from each sample to the next.
-    fn correlations(&self, memory: f64) -> Vec<f64> {
-        self.steps.iter().map(|step| (-step / memory).exp()).collect()
+    fn shares(self) -> Vec<(usize, f64)> {
+        match self {
+            Self::One(memory) => vec![(memory, 1.0)],
+            Self::Flicker(tilt) => {
+                let whole: f64 = (0..RUNGS.len()).map(|rung| tilt.powi(rung as i32)).sum();
+                RUNGS.iter().enumerate().map(|(rung, memory)| (*memory, tilt.powi(rung as i32) / whole)).collect()
+            }
+        }
     }
+}
+
+/// A wander, and the white variance over its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    wander: Wander,
+    white: f64,
 }
 
 fn grid() -> impl Iterator<Item = Noise> {
-    MEMORIES.iter().flat_map(|memory| WHITES.iter().map(move |white| (*memory, *white)))
+    Wander::all().flat_map(|wander| WHITES.iter().map(move |white| Noise { wander, white: *white }))
 }
-
-/// A wander's time constant in samples, and the white variance over its own.
-pub type Noise = (f64, f64);
 
 /// Twice the log likelihood (up to a constant of the length) of `values` about the columns of `design`, at the best wander.
 pub fn twice_log_likelihood(values: &[f64], design: &DMatrix<f64>, beat: &Beat) -> f64 {
@@ -48,14 +76,14 @@ pub fn twice_log_likelihood(values: &[f64], design: &DMatrix<f64>, beat: &Beat) 
 /// The likeliest wander, and twice its log likelihood.
 pub fn best(values: &[f64], design: &DMatrix<f64>, beat: &Beat) -> (Noise, f64) {
     let at = |noise| (noise, in_noise(values, design, beat, noise));
-    grid().map(at).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or(((1.0, 1.0), f64::NEG_INFINITY))
+    let nothing = Noise { wander: Wander::One(0), white: 1.0 };
+    grid().map(at).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((nothing, f64::NEG_INFINITY))
 }
 
 /// Twice the log likelihood in one noise.
-pub fn in_noise(values: &[f64], design: &DMatrix<f64>, beat: &Beat, (memory, white): Noise) -> f64 {
+pub fn in_noise(values: &[f64], design: &DMatrix<f64>, beat: &Beat, noise: Noise) -> f64 {
     let n = values.len() as f64;
-    Whitened::new(values, design, &beat.correlations(memory), white)
-        .map_or(f64::NEG_INFINITY, |w| -(n * (w.left / n).ln() + w.log_det))
+    Whitened::new(values, design, beat, noise).map_or(f64::NEG_INFINITY, |w| -(n * (w.left / n).ln() + w.log_det))
 }
 
 /// Covariance of the coefficients that ordinary least squares gives, in this noise.
@@ -66,11 +94,12 @@ pub fn covariance(values: &[f64], design: &DMatrix<f64>, beat: &Beat) -> DMatrix
     let none = || DMatrix::from_diagonal_element(k, k, f64::MAX);
     let Some(inverse) = normal.clone().try_inverse() else { return none() };
     let mut parts: Vec<(f64, DMatrix<f64>)> = Vec::new();
-    for (memory, white) in grid() {
-        let correlations = beat.correlations(memory);
-        let Some(w) = Whitened::new(values, design, &correlations, white) else { continue };
+    let wandered = beat.correlations.each_ref().map(|correlations| design.tr_mul(&wander_times(design, correlations)));
+    for noise in grid() {
+        let Some(w) = Whitened::new(values, design, beat, noise) else { continue };
         let weight = -0.5 * (free * (w.left / free).ln() + w.log_det + w.log_det_normal);
-        let middle = design.tr_mul(&wander_times(design, &correlations)) + &normal * white;
+        let shares = noise.wander.shares();
+        let middle = shares.iter().fold(&normal * noise.white, |sum, (k, share)| sum + &wandered[*k] * *share);
         parts.push((weight, &inverse * middle * &inverse * (w.left / free)));
     }
     let top = parts.iter().map(|(weight, _)| *weight).fold(f64::NEG_INFINITY, f64::max);
@@ -112,32 +141,78 @@ struct Whitened {
 
 impl Whitened {
     /// A Kalman filter whitens values and columns alike.
-    fn new(values: &[f64], design: &DMatrix<f64>, correlations: &[f64], white: f64) -> Option<Self> {
+    fn new(values: &[f64], design: &DMatrix<f64>, beat: &Beat, noise: Noise) -> Option<Self> {
+        const MOST: usize = RUNGS.len();
+        let shares = noise.wander.shares();
+        let m = shares.len();
         let (n, k) = design.shape();
         let mut rows = DMatrix::zeros(n, k);
         let mut y = DVector::zeros(n);
-        let mut state = DVector::<f64>::zeros(k + 1);
-        let (mut variance, mut log_det) = (1.0, 0.0);
+        let mut state = vec![[0.0_f64; MOST]; k + 1];
+        let mut variance = [[0.0; MOST]; MOST];
+        shares.iter().enumerate().for_each(|(a, (_, share))| variance[a][a] = *share);
+        let mut log_det = 0.0;
         for i in 0..n {
-            let innovation = variance + white;
-            let (scale, gain) = (innovation.sqrt().recip(), variance / innovation);
+            let seen: [f64; MOST] = std::array::from_fn(|a| variance[a][..m].iter().sum());
+            let innovation = seen[..m].iter().sum::<f64>() + noise.white;
+            let scale = innovation.sqrt().recip();
             log_det += innovation.ln();
-            let rho = correlations.get(i).copied().unwrap_or(0.0);
-            for j in 0..=k {
+            let rho: [f64; MOST] = std::array::from_fn(|a| {
+                shares.get(a).and_then(|(memory, _)| beat.correlations[*memory].get(i).copied()).unwrap_or(0.0)
+            });
+            for (j, state) in state.iter_mut().enumerate() {
                 let x = if j < k { design[(i, j)] } else { values[i] };
-                let new = x - state[j];
+                let new = x - state[..m].iter().sum::<f64>();
                 if j < k {
                     rows[(i, j)] = new * scale;
                 } else {
                     y[i] = new * scale;
                 }
-                state[j] = rho * (state[j] + gain * new);
+                for a in 0..m {
+                    state[a] = rho[a] * (state[a] + seen[a] / innovation * new);
+                }
             }
-            variance = rho * rho * variance * (1.0 - gain) + 1.0 - rho * rho;
+            for a in 0..m {
+                for b in 0..m {
+                    variance[a][b] = rho[a] * rho[b] * (variance[a][b] - seen[a] * seen[b] / innovation);
+                }
+                variance[a][a] += shares[a].1 * (1.0 - rho[a] * rho[a]);
+            }
         }
         let factor = rows.tr_mul(&rows).cholesky()?;
         let left = (&y - &rows * factor.solve(&rows.tr_mul(&y))).norm_squared().max(f64::MIN_POSITIVE);
         let log_det_normal = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.abs().ln()).sum::<f64>();
         Some(Self { left, log_det, log_det_normal })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The filter's likelihood is that of the whole covariance matrix, for one process and for a sum of them, across a gap.
+    #[test]
+    fn the_filter_is_the_inverse_of_the_covariance() {
+        let t_s: Vec<f64> = (0..40).map(|i| 10.0 * f64::from(i) + if i > 22 { 170.0 } else { 0.0 }).collect();
+        let values: Vec<f64> = t_s.iter().map(|t| (0.013 * t).sin() + (0.9 * t).cos()).collect();
+        let design = DMatrix::from_fn(40, 2, |i, j| if j == 0 { 1.0 } else { t_s[i] / 400.0 });
+        for noise in grid().filter(|noise| noise.white > 0.0) {
+            let covariance = DMatrix::from_fn(40, 40, |i, j| {
+                let apart = (t_s[i] - t_s[j]).abs() / 10.0;
+                let wander: f64 =
+                    noise.wander.shares().iter().map(|(k, share)| share * (-apart / MEMORIES[*k]).exp()).sum();
+                wander + if i == j { noise.white } else { 0.0 }
+            });
+            let cholesky = covariance.cholesky().unwrap();
+            let [x, y] = [&design, &DMatrix::from_column_slice(40, 1, &values)].map(|m| cholesky.solve(m));
+            let normal = design.tr_mul(&x);
+            let right = design.tr_mul(&y);
+            let energy = DMatrix::from_column_slice(40, 1, &values).dot(&y);
+            let left = energy - right.dot(&normal.clone().cholesky().unwrap().solve(&right));
+            let log_det = 2.0 * cholesky.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+            let found = Whitened::new(&values, &design, &Beat::new(&t_s), noise).unwrap();
+            assert!((found.left / left - 1.0).abs() < 1e-6, "{noise:?}: {} for {left}", found.left);
+            assert!((found.log_det - log_det).abs() < 1e-6, "{noise:?}: {} for {log_det}", found.log_det);
+        }
     }
 }

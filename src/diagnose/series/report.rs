@@ -71,6 +71,7 @@ impl Row<'_> {
             let with = match follows {
                 Follows::Temperature(k, _) => format!(" Covariate: {}.", self.series.covariates[*k].name),
                 Follows::Delayed(k, _) => format!(" Covariate: {}, delayed.", self.series.covariates[*k].name),
+                Follows::Field(k) => format!(" Covariate: {}.", self.series.covariates[*k].name),
                 _ => String::new(),
             };
             let r2 = 1.0 - (is / was).powi(2);
@@ -81,7 +82,19 @@ impl Row<'_> {
             let rms = vec![self.found.fits[i].rms_from(&self.found.fits[i + 1])];
             Effect { id, name, posterior: posterior(*score), parameters, axis, from_degree: None, why, rms }
         };
-        self.found.effects.iter().enumerate().map(one).collect()
+        let mut effects: Vec<Effect> = Vec::new();
+        for effect in self.found.effects.iter().enumerate().map(one) {
+            // Components of a field are one effect.
+            let Some(same) = effects.iter_mut().find(|other| other.id == effect.id) else {
+                effects.push(effect);
+                continue;
+            };
+            same.posterior = same.posterior.max(effect.posterior);
+            same.parameters.extend(effect.parameters);
+            same.why.push_str(&format!(" {}", effect.why));
+            same.rms.iter_mut().zip(effect.rms).for_each(|(all, one)| *all = all.hypot(one));
+        }
+        effects
     }
 
     fn parameters(&self, i: usize, follows: Follows) -> Vec<ParameterAnswer> {
@@ -97,6 +110,13 @@ impl Row<'_> {
                     parameter(&format!("slope_{name}{named}"), value, sigma, &format!("{unit}/{per}")),
                     parameter("lag_s", lag_s, inner, "s"),
                 ]
+            }
+            Follows::Field(k) => {
+                let covariate = &self.series.covariates[k];
+                let per = &covariate.unit;
+                let named = if unit == "ng" && per == "T" { "_ng_per_t" } else { "" };
+                let name = format!("k{name}{}{named}", covariate.component().to_lowercase());
+                vec![parameter(&name, value, sigma, &format!("{unit}/{per}"))]
             }
             Follows::Drift(tau_s) => {
                 vec![parameter("tau_s", tau_s, inner, "s"), parameter(&format!("a{name}{ng}"), value, sigma, unit)]
@@ -309,7 +329,7 @@ fn located(measured: &[&Row<'_>]) -> Located {
     };
     let covariates = measured.iter().flat_map(|row| {
         let follows = |f: Follows| match f {
-            Follows::Temperature(k, _) | Follows::Delayed(k, _) | Follows::Form(_, k, _) => {
+            Follows::Temperature(k, _) | Follows::Delayed(k, _) | Follows::Field(k) | Follows::Form(_, k, _) => {
                 row.series.covariates[k].name.clone()
             }
             other => other.id().to_owned(),

@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::follow::{Equation, Follows, Form, equation};
 use super::read::{Axis, CovariateSeries, Series};
 use super::red::{self, Beat};
+use crate::diagnose::earlier::REACH_S;
 use crate::diagnose::measured::{MeasuredCase, MeasuredError};
 use crate::math::rms::rms;
 
@@ -27,7 +28,8 @@ const OFFSETS: [f64; 11] = [0.0, 1.0, 2.0, 4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.
 const HELD_OUT_S: f64 = 6.0 * 3600.0;
 /// Where means are rarer, so many of them together.
 const HELD_OUT_BLOCKS_MIN: f64 = 4.0;
-const EFFECTS_MAX: usize = 4;
+/// Terms of a model at most, each component of a field one.
+const TERMS_MAX: usize = 6;
 /// Evidence by which a form must be above all effects found: twice the logarithm of odds of twenty.
 const FORM_MARGIN: f64 = 6.0;
 const GOLDEN: f64 = 0.618_033_988_749_895;
@@ -134,7 +136,7 @@ pub fn search(series: &Series, axis: &Axis, included: &[Follows]) -> AxisFound {
     let mut refused = 0.0;
     // An axis that does not move but for rounding follows nothing.
     let still = regress(series, axis, included).rms() <= axis.rounding();
-    for _ in 0..if still { 0 } else { EFFECTS_MAX } {
+    for _ in 0..if still { 0 } else { TERMS_MAX } {
         let Step { best, strongest } = step(series, axis, &model, &beat);
         refused = strongest;
         let Some((candidate, score)) = best else { break };
@@ -185,10 +187,11 @@ struct Step {
 }
 
 fn step(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Step {
-    let taken = |id: &str| model.iter().any(|f| f.id() == id);
-    let steps = if taken("bias_step") { Vec::new() } else { likely_steps(series, axis, model, beat) };
-    let delays = if taken("temperature_bias") { Vec::new() } else { likely_delays(series, axis, model, beat) };
-    let all = candidates(series, axis).into_iter().chain(steps).chain(delays).filter(|c| !taken(c.id()));
+    let has = |id: &str| model.iter().any(|f| f.id() == id);
+    let steps = if has("bias_step") { Vec::new() } else { likely_steps(series, axis, model, beat) };
+    let delays = if has("temperature_bias") { Vec::new() } else { likely_delays(series, axis, model, beat) };
+    let open = |c: &Follows| !model.iter().any(|f| f.excludes(c));
+    let all = candidates(series, axis).into_iter().chain(steps).chain(delays).filter(open);
     best_of(series, axis, model, all.collect(), beat)
 }
 
@@ -218,7 +221,7 @@ fn forms(series: &Series) -> Vec<Follows> {
     let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
     let lags_s: Vec<f64> = [0.0].into_iter().chain(LAGS.map(|part| part * span_s)).collect();
     let of_one = |(k, covariate): (usize, &CovariateSeries)| {
-        let listed = |form: &Form| *form == Form::Linear && covariate.is_temperature();
+        let listed = |form: &Form| *form == Form::Linear && (covariate.is_temperature() || covariate.is_magnetic());
         let forms = Form::ALL.into_iter().filter(|form| !listed(form));
         forms.flat_map(|form| lags_s.iter().map(move |lag_s| Follows::Form(form, k, *lag_s))).collect::<Vec<Follows>>()
     };
@@ -230,8 +233,11 @@ fn candidates(series: &Series, axis: &Axis) -> Vec<Follows> {
     let mut all = Vec::new();
     for (k, _) in series.covariates.iter().enumerate().filter(|(_, c)| c.is_temperature()) {
         all.push(Follows::Temperature(k, 0.0));
-        all.extend(LAGS.map(|part| Follows::Temperature(k, part * span_s)));
+        let lags_s = LAGS.iter().map(|part| part * span_s).filter(|lag_s| *lag_s <= REACH_S);
+        all.extend(lags_s.map(|lag_s| Follows::Temperature(k, lag_s)));
     }
+    let fields = series.covariates.iter().enumerate().filter(|(_, c)| c.is_magnetic());
+    all.extend(fields.map(|(k, _)| Follows::Field(k)));
     all.extend(DRIFTS.map(|part| Follows::Drift(part * span_s)));
     if axis.reference.is_some() {
         let beat_s = series.beat_s();
@@ -265,7 +271,7 @@ fn likely_steps(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) ->
 fn likely_delays(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Vec<Follows> {
     let without = equation(series, axis, model);
     let (noise, _) = red::best(&without.values, &design(series, &without), beat);
-    let longest = (DELAY_MAX * series.t_s.len() as f64) as usize;
+    let longest = (DELAY_MAX * series.t_s.len() as f64).min(REACH_S / series.beat_s()) as usize;
     let temperatures = series.covariates.iter().enumerate().filter(|(_, covariate)| covariate.is_temperature());
     let of_one = |(k, _)| {
         let at = |beats: usize| {
@@ -290,7 +296,9 @@ fn refined(series: &Series, axis: &Axis, model: &mut [Follows], from: usize, bea
             Follows::Temperature(_, s) | Follows::Delayed(_, s) | Follows::Drift(s) | Follows::Form(.., s)
                 if s > 0.0 =>
             {
-                let log = golden(s.ln() - 0.7, s.ln() + 0.7, 14, &mut |x| at(model, x.exp()));
+                let longest_s = if model[i].id() == "temperature_bias" { REACH_S } else { f64::INFINITY };
+                let high = (s.ln() + 0.7).min(longest_s.ln());
+                let log = golden(s.ln() - 0.7, high, 14, &mut |x| at(model, x.exp()));
                 model[i] = model[i].with_inner(log.exp());
             }
             Follows::Step(s) => {
@@ -437,10 +445,16 @@ pub fn included(case: &MeasuredCase, series: &Series, axis: &Axis) -> Result<Vec
         let steps = likely_steps(series, axis, &model, &beat);
         let of_kind =
             candidates(series, axis).into_iter().chain(steps).filter(|c| c.id() == token).map(|c| (c, likely(&c)));
-        let Some((follows, _)) = of_kind.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        let of_kind: Vec<(Follows, f64)> = of_kind.collect();
+        if token == "magnetic_sensitivity" && !of_kind.is_empty() {
+            model.extend(of_kind.into_iter().map(|(field, _)| field));
+            continue;
+        }
+        let Some((follows, _)) = of_kind.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
             return Err(case.wrong(
                 "simulation.includes",
-                "some of constant, reference, temperature_bias (with a temperature among the covariates), bias_drift, bias_step, \
+                "some of constant, reference, temperature_bias (with a temperature among the covariates), \
+                 magnetic_sensitivity (with a field among them), bias_drift, bias_step, \
                  scale_factor and time_offset (with a reference)",
             ));
         };

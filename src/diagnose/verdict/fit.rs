@@ -25,6 +25,7 @@ pub fn fit(
     let left = search::residual(scene, frame, entries, set);
     let after = frame.with_data(&left);
     let dof = 3.0 * (scene.schedule.len() as f64 - 1.0);
+    let before = frame.with_data(&scene.residual_ng);
     let level = |axes: &Axes, f: &Frame, used: f64| FitLevel {
         rms_ng: std::array::from_fn(|k| rms_about_mean(&axes[k])),
         whitened_chi2_per_dof: f.data.dot(&f.data) / (dof - used),
@@ -44,7 +45,7 @@ pub fn fit(
     }
     let fit = Fit {
         noise_floor_ng: std::array::from_fn(|k| weighed.noise[k].rms_ng()),
-        before: level(&scene.residual_ng, frame, 0.0),
+        before: level(&scene.residual_ng, &before, 0.0),
         after: level(&left, &after, used),
         held_out: tried.blocks,
         confirmed: tried.confirmed,

@@ -3,7 +3,6 @@
 
 use super::Best;
 use super::named::parts;
-use crate::diagnose::catalogue::full;
 use crate::diagnose::search::{self, Bank};
 use crate::diagnose::separating::{Part, Rival};
 use crate::diagnose::solve::Library;
@@ -17,10 +16,10 @@ pub fn imitators(library: &Library, best: &Best) -> Vec<Rival> {
     let key = best.set.key();
     let Some(parts) = parts(library, &best.set) else { return Vec::new() };
     let mut found = Vec::new();
-    for (i, series) in best.contributions.iter().enumerate() {
-        let frame = best.frame.with_data(series);
-        let seen = bank.before(&frame.data);
-        let whole = frame.column(&full(series.clone()), 1.0);
+    for i in 0..best.set.members.len() {
+        let whole = best.set.whitened(i, &best.frame);
+        let frame = best.frame.before(whole.clone());
+        let seen = bank.before(&whole);
         let others = best.set.without(i);
         let chosen = others.chosen_about_nothing(&frame);
         if chosen.left_in(&whole).0 < SAME_SNR * SAME_SNR {

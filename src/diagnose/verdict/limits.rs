@@ -43,9 +43,10 @@ pub fn upper_limits(library: &Library, frame: &Frame, set: &Set) -> Vec<UpperLim
 
 /// The same of all series of an effect together, beside what is chosen; none of one that is a constant in this record but for rounding.
 fn limit_of(frame: &Frame, chosen: &Chosen, series: &[Raw]) -> Option<f64> {
+    let windows = frame.windows();
     let centred: Vec<Raw> =
-        series.iter().map(|raw| raw.each_ref().map(|x| x.as_ref().map(|x| about_mean(x)))).collect();
-    let n = centred.iter().flatten().flatten().map(Vec::len).max().unwrap_or(1) as f64;
+        series.iter().map(|raw| raw.each_ref().map(|x| x.as_ref().map(|x| about_mean(&x[..windows])))).collect();
+    let n = windows as f64;
     let product = |i: usize, j: usize| -> f64 {
         let axes = centred[i].iter().zip(&centred[j]);
         axes.filter_map(|(a, b)| Some(a.as_ref()?.iter().zip(b.as_ref()?).map(|(a, b)| a * b).sum::<f64>())).sum()

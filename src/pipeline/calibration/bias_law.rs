@@ -73,6 +73,9 @@ pub struct BiasFit {
     pub law: BiasLaw,
     /// Covariance of A1, A2, A3, A4, ln t0, ln t1.
     pub covariance: [[f64; PARAMETERS]; PARAMETERS],
+    /// By how much each of them is away from where it was expected before anything was measured, and the width of that: of A1 nothing
+    /// was expected.
+    pub departures: [(f64, f64); PARAMETERS],
     /// Variance of what the law does not describe, squared counts, and the clock span of support in hours since lift-off.
     pub drift_variance: f64,
     /// First and last measurement used, hours since lift-off.
@@ -372,8 +375,12 @@ fn judge(points: &[Point], weights: &[f64], expectation: &Expectation, theta: &D
         let g = Vector6::from(BiasFit::gradient(&law, point.met_h, point.temperature_c));
         (covariance * g * (weight / point.sigma_counts.powi(2))).into()
     };
+    let mut departures = problem.expected();
+    departures.iter_mut().zip(theta.iter()).for_each(|(expected, figure)| expected.0 = figure - expected.0);
+    departures[0].0 = 0.0;
     let mut fit = BiasFit {
         answers: points.iter().zip(weights).map(answer).collect(),
+        departures,
         law,
         covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
         drift_variance: 0.0,
