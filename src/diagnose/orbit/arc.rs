@@ -95,6 +95,15 @@ impl Arc {
         Ok(Self { id, t_s: track.t_s.clone(), observed_m, fitted, masked, start, step_s })
     }
 
+    /// Leaves epochs out, as masked.
+    pub fn leave_out(&mut self, epochs: &[usize]) {
+        let kept = |i: &usize| !epochs.contains(i);
+        self.fitted = (0..self.fitted).filter(kept).count();
+        self.t_s = (0..self.t_s.len()).filter(kept).map(|i| self.t_s[i]).collect();
+        self.observed_m = (0..self.observed_m.len()).filter(kept).map(|i| self.observed_m[i]).collect();
+        self.masked += epochs.len();
+    }
+
     /// Lowest height over the equatorial radius, m.
     pub fn height_min_m(&self) -> f64 {
         let lowest = self.observed_m.iter().map(|r| r.norm()).fold(f64::INFINITY, f64::min);

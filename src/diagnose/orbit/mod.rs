@@ -1,6 +1,7 @@
 //! Precise orbits against a list of forces: what is missing from the list, per satellite and for all.
 
 pub mod arc;
+pub mod blunders;
 pub mod finer;
 pub mod forces;
 pub mod held_out;
@@ -93,8 +94,9 @@ pub enum OrbitError {
 
 /// Analyse an orbit case.
 pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
-    let problem = finer::settled(problem(case, files)?);
-    let search = problem.search(&mut |_| ());
+    let mut problem = problem(case, files)?;
+    blunders::leave_out(&mut problem);
+    let search = finer::settled(&mut problem);
     Ok((report::answer(&case.id, &problem, &search), report::plates(&problem, &search)))
 }
 

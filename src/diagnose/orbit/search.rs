@@ -17,7 +17,7 @@ use crate::physics::integrator::State;
 /// Evidence that all arcs together must give for a term: odds of one in 8,000 for chance at twice the log.
 pub const SCORE_MIN: f64 = 18.0;
 /// One arc counts for no more than this, so that a single odd satellite cannot name a common cause.
-const SCORE_ARC_MAX: f64 = 100.0;
+pub(super) const SCORE_ARC_MAX: f64 = 100.0;
 /// Unlisted accelerations (radiation from the Earth, antennas, attitude: 1e-10 m/s^2) leave up to this many times the stated
 /// accuracy in an arc of two days, which is no finding; beyond it something is there.
 const EXCESS_MAX: f64 = 4.0;
@@ -324,6 +324,10 @@ pub fn evidence(arc: &Arc, fit: &ArcFit, term: Term) -> f64 {
         (&projected.residual - projected.columns.column_sum(), 0.0)
     } else {
         let Some(step) = super::arc::solve(&projected.columns, &projected.residual) else { return 0.0 };
+        // Air never pushes.
+        if term == Term::Drag && step[0] <= 0.0 {
+            return 0.0;
+        }
         (&projected.residual - &projected.columns * step, projected.columns.ncols() as f64)
     };
     let n = independent(&after, projected.unknowns);

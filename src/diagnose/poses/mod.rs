@@ -402,9 +402,11 @@ fn effect(case: &MeasuredCase, fit: &Triad, part: Part, score: f64, [was, is]: [
     let why = format!("With it |a| - g falls from {was:.5} to {is:.5} m/s^2 rms.{extra}");
     let axis = (part == Part::Scale).then(|| ["x", "y", "z"][largest].to_owned());
     if part == Part::Scale {
-        // The three add to nothing: what the axis has beyond the mean of the others is half as much again.
         let (value, sigma) = values[largest];
-        parameters.insert(0, parameter("fraction", 1.5 * value, 1.5 * sigma, &unit));
+        // The three add to nothing: the others have minus half of it in the mean.
+        let others = 1.0 - 0.5 * value;
+        let beyond = (1.0 + value) / others - 1.0;
+        parameters.insert(0, parameter("fraction", beyond, 1.5 * sigma / others.powi(2), &unit));
     }
     let (id, name) = (part.id().to_owned(), part.name().to_owned());
     Effect { id, name, posterior: posterior(score), parameters, axis, from_degree: None, why, rms: vec![fit.rms()] }
