@@ -102,8 +102,10 @@ pub fn run_open(directory: &Path, analyser: &dyn Analyser, progress: &ProgressBa
     progress.set_length(cases.len() as u64);
     let outcomes = Mutex::new(Vec::new());
     cases.par_iter().try_for_each(|path| -> io::Result<()> {
-        let text = std::fs::read_to_string(path.join("truth.json"))?;
-        let truth: Truth = serde_json::from_str(&text).map_err(io::Error::other)?;
+        let file = path.join("truth.json");
+        let in_file = |error: &dyn std::fmt::Display| io::Error::other(format!("{}: {error}", file.display()));
+        let text = std::fs::read_to_string(&file).map_err(|error| in_file(&error))?;
+        let truth: Truth = serde_json::from_str(&text).map_err(|error| in_file(&error))?;
         let (answer, seconds) = timed(analyser, &Material::Directory(path), truth.deleted.as_deref());
         progress.inc(1);
         outcomes.lock().unwrap_or_else(|e| e.into_inner()).push(Outcome { truth, answer, seconds });

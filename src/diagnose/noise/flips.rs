@@ -137,3 +137,103 @@ fn alone(flips: &[Flip], i: usize) -> f64 {
     let away = median(&mut beside).map_or(0.0, |middle| (flips[i].rest_ng - middle).abs() / flips[i].sigma_ng);
     (away / ALONE_SIGMA).max(1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    const SIGMA_NG: f64 = 15.0;
+    /// No figure is away from where it was expected; all of them may be far, but for the two time constants.
+    const WIDTHS_NG: [f64; PARAMETERS] = [1e5, 100.0, 100.0, 10.0, 0.7, 1.2];
+
+    /// Sixteen flips in three days, less a law fitted to them as widely as these widths allow.
+    fn flips(
+        away_ng: impl Fn(usize) -> f64,
+        normal: &mut impl FnMut() -> f64,
+    ) -> (Vec<Flip>, [(f64, f64); PARAMETERS]) {
+        const FLIPS: usize = 16;
+        let gradient = |i: usize| {
+            let met_h = 10.0 + 4.5 * i as f64;
+            let [early, late] = [(-met_h / 12.0).exp(), (-met_h / 120.0).exp()];
+            [1.0, early, late, (met_h / 4.0).sin(), 60.0 * early * met_h / 12.0, 60.0 * late * met_h / 120.0]
+        };
+        let law = DMatrix::from_fn(FLIPS, PARAMETERS, |i, j| gradient(i)[j] * WIDTHS_NG[j]);
+        let figures = DVector::from_fn(PARAMETERS, |j, _| if j == 0 { 1e-3 } else { 1.0 } * normal());
+        let measured = DVector::from_fn(FLIPS, |i, _| SIGMA_NG * normal() + away_ng(i)) + &law * &figures;
+        let inverse =
+            (law.tr_mul(&law) / SIGMA_NG.powi(2) + DMatrix::identity(PARAMETERS, PARAMETERS)).try_inverse().unwrap();
+        let fitted = inverse * law.tr_mul(&measured) / SIGMA_NG.powi(2);
+        let rest = &measured - &law * &fitted;
+        let flip = |i: usize| Flip {
+            clock_s: 16_200.0 * i as f64,
+            rest_ng: rest[i],
+            sigma_ng: SIGMA_NG,
+            gradient_ng: gradient(i),
+        };
+        let mut departures = std::array::from_fn(|j| (fitted[j] * WIDTHS_NG[j], WIDTHS_NG[j]));
+        departures[0].0 = 0.0;
+        ((0..FLIPS).map(flip).collect(), departures)
+    }
+
+    /// The size of a step after the tenth flip that the flips say, and its standard error.
+    fn step(flips: &Flips) -> (f64, f64) {
+        let seen = flips.filtered(&std::array::from_fn::<f64, 16, _>(|i| if i < 10 { 0.0 } else { 1.0 }));
+        let information: f64 = seen.iter().map(|x| x * x).sum();
+        let product: f64 = seen.iter().zip(&flips.rest).map(|(a, b)| a * b).sum();
+        (product / information, information.sqrt().recip())
+    }
+
+    /// Of steps of 100 ng, and of none, with a random walk beside them and without.
+    #[test]
+    fn what_flips_say_of_a_step_holds_within_its_error() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        for (walk_ng, size_ng) in [(0.0, 0.0), (0.0, 100.0), (8.0, 0.0), (8.0, 100.0)] {
+            let (mut within, mut squares, mut numbers) = (0, 0.0, 0);
+            let mut sigma = 0.0;
+            for _ in 0..400 {
+                let mut walk = [0.0; 16];
+                (1..16).for_each(|i| walk[i] = walk[i - 1] + walk_ng * normal());
+                let away = |i: usize| walk[i] + if i < 10 { 0.0 } else { size_ng };
+                let (flips, departures) = flips(away, &mut normal);
+                let flips = Flips::new(&flips, &departures);
+                let (found_ng, sigma_ng) = step(&flips);
+                within += usize::from((found_ng - size_ng).abs() < 2.0 * sigma_ng);
+                squares += flips.rest.iter().map(|x| x * x).sum::<f64>();
+                numbers += flips.rest.len();
+                sigma += sigma_ng / 400.0;
+            }
+            println!("walk {walk_ng}, step {size_ng}: {within} of 400 within two errors of {sigma:.0} ng");
+            assert!(within >= 370, "walk {walk_ng}, step {size_ng}: {within}");
+            if size_ng == 0.0 {
+                let mean = squares / f64::from(numbers as u32);
+                assert!((0.6..1.15).contains(&mean), "numbers of mean square {mean}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_flip_that_is_off_says_little() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(9);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        for off in [0, 7, 15] {
+            let away = |i: usize| if i == off { 40.0 * SIGMA_NG } else { 0.0 };
+            let (flips, departures) = flips(away, &mut normal);
+            let flips = Flips::new(&flips, &departures);
+            let energy: f64 = flips.rest.iter().map(|x| x * x).sum();
+            assert!(energy < 60.0, "off at {off}: {energy}");
+        }
+    }
+
+    #[test]
+    fn laws_of_an_axis_stand_side_by_side() {
+        let one = Flips { rows: vec![vec![1.0, 2.0]], rest: vec![0.5] };
+        let other = Flips { rows: vec![vec![3.0], vec![4.0]], rest: vec![0.1, 0.2] };
+        let both: Flips = [&one, &other].into_iter().collect();
+        assert_eq!(both.filtered(&[10.0, 1.0, 100.0]), [12.0, 300.0, 400.0]);
+        assert_eq!(both.rest, [0.5, 0.1, 0.2]);
+    }
+}

@@ -36,11 +36,15 @@ pub(super) fn sensor(c: &mut Collector) {
     let t = &s.temperature_c;
     let mean = t.iter().sum::<f64>() / t.len() as f64;
     let last = t.len() - 1;
-    let slope = |g: usize| {
-        let [a, b] = [g.saturating_sub(15), (g + 15).min(last)];
+    let slope_over = |g: usize, rows: usize| {
+        let [a, b] = [g.saturating_sub(rows), (g + rows).min(last)];
         (t[b] - t[a]) / (s.grid_s[b] - s.grid_s[a])
     };
-    c.grid("dT/dt", "temperature", "changing temperature", slope);
+    // Rounding is a small part of ten minutes' change; what follows a faster one is not seen in that.
+    let slope = |g: usize| slope_over(g, 15);
+    let slopes = [(15, "dT/dt"), (4, "dT/dt, within minutes"), (1, "dT/dt, from row to row")]
+        .map(|(rows, said)| (said.to_string(), s.measure_scalar(|g| slope_over(g, rows))));
+    c.family("temperature", "changing temperature", slopes);
     c.grid("|dT/dt|", "temperature", "changing temperature", |g| slope(g).abs());
     c.grid("(T - <T>)^2", "temperature", "extreme temperature", |g| (t[g] - mean).powi(2));
     c.grid("(T - <T>)^3", "temperature", "extreme temperature", |g| (t[g] - mean).powi(3));

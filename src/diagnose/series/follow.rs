@@ -3,6 +3,7 @@
 
 use super::read::{Axis, Series};
 use crate::diagnose::measure::relaxed;
+use crate::math::rms::rms_about_mean;
 
 /// An effect a sensor's series may show.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +35,8 @@ pub enum Form {
     Square,
     /// To the third power of that.
     Cube,
+    /// To what follows it with a slack (the play operator of Prandtl 1928) of so many tenths of its deviation.
+    Play(u8),
 }
 
 impl Follows {
@@ -118,11 +121,16 @@ impl Follows {
 
 impl Form {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Linear, Self::Square, Self::Cube];
+    pub const ALL: [Self; 6] = [Self::Linear, Self::Square, Self::Cube, Self::Play(7), Self::Play(14), Self::Play(24)];
+
+    /// Whether it may be late as well.
+    pub fn may_be_late(self) -> bool {
+        !matches!(self, Self::Play(_))
+    }
 
     fn exponent(self) -> i32 {
         match self {
-            Self::Linear => 1,
+            Self::Linear | Self::Play(_) => 1,
             Self::Square => 2,
             Self::Cube => 3,
         }
@@ -130,20 +138,36 @@ impl Form {
 
     fn of(self, values: &[f64]) -> Vec<f64> {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
-        values.iter().map(|x| (x - mean).powi(self.exponent())).collect()
+        let about_mean = values.iter().map(|x| x - mean);
+        let Self::Play(tenths) = self else { return about_mean.map(|x| x.powi(self.exponent())).collect() };
+        let half = 0.5 * slack(tenths, values);
+        let mut follower = values.first().map_or(0.0, |x| x - mean);
+        let follow = |x: f64| {
+            follower = follower.clamp(x - half, x + half);
+            follower
+        };
+        about_mean.map(follow).collect()
     }
 
     /// Its power, as it is written behind what is raised to it.
     pub fn power(self) -> &'static str {
-        ["", "^2", "^3"][self as usize]
+        ["", "^2", "^3"][self.exponent() as usize - 1]
     }
 
-    /// As a formula of a covariate.
-    pub fn words(self, covariate: &str, lag_s: f64) -> String {
+    /// As a formula of a covariate, by its name and its values.
+    pub fn words(self, covariate: &str, values: &[f64], lag_s: f64) -> String {
         let power = self.power();
         let late = if lag_s > 0.0 { format!(", {lag_s:.0} s late") } else { String::new() };
-        format!("({covariate} - <{covariate}>){power}{late}")
+        let slack = match self {
+            Self::Play(tenths) => format!(", followed with a slack of {:.3}", slack(tenths, values)),
+            _ => String::new(),
+        };
+        format!("({covariate} - <{covariate}>){power}{slack}{late}")
     }
+}
+
+fn slack(tenths: u8, values: &[f64]) -> f64 {
+    0.1 * f64::from(tenths) * rms_about_mean(values)
 }
 
 /// One axis to be explained: its values less what is known of them, and the columns of a model.

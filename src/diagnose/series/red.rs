@@ -2,8 +2,9 @@
 //! noise, a sum of such processes of all memories.
 //!
 //! The wander is a competitor of every effect: what a slow covariate explains must be explained better than a wander does
-//! it. It also sets the standard errors: a covariance is averaged over every wander that the data allow, each with the
-//! weight of its restricted likelihood, because a short series does not tell a long memory from a longer one.
+//! it. It also sets the standard errors: a covariance is averaged over every wander of a kind that the data allow, each with the
+//! weight of its restricted likelihood, because a short series does not tell a long memory from a longer one; of both kinds the wider
+//! errors hold.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -93,26 +94,45 @@ pub fn covariance(values: &[f64], design: &DMatrix<f64>, beat: &Beat) -> DMatrix
     let normal = design.tr_mul(design);
     let none = || DMatrix::from_diagonal_element(k, k, f64::MAX);
     let Some(inverse) = normal.clone().try_inverse() else { return none() };
-    let mut parts: Vec<(f64, DMatrix<f64>)> = Vec::new();
     let wandered = beat.correlations.each_ref().map(|correlations| design.tr_mul(&wander_times(design, correlations)));
-    for noise in grid() {
-        let Some(w) = Whitened::new(values, design, beat, noise) else { continue };
+    let part = |noise: Noise| {
+        let w = Whitened::new(values, design, beat, noise)?;
         let weight = -0.5 * (free * (w.left / free).ln() + w.log_det + w.log_det_normal);
         let shares = noise.wander.shares();
         let middle = shares.iter().fold(&normal * noise.white, |sum, (k, share)| sum + &wandered[*k] * *share);
-        parts.push((weight, &inverse * middle * &inverse * (w.left / free)));
-    }
-    let top = parts.iter().map(|(weight, _)| *weight).fold(f64::NEG_INFINITY, f64::max);
+        Some((weight, &inverse * middle * &inverse * (w.left / free)))
+    };
+    let of_kind = |flicker: bool| -> Vec<(f64, DMatrix<f64>)> {
+        let kind = grid().filter(|noise| matches!(noise.wander, Wander::Flicker(_)) == flicker);
+        kind.filter_map(part).collect()
+    };
+    let kinds = [of_kind(false), of_kind(true)];
+    let top = kinds.iter().flatten().map(|(weight, _)| *weight).fold(f64::NEG_INFINITY, f64::max);
     if !top.is_finite() {
         return none();
     }
-    let mut sum = DMatrix::zeros(k, k);
-    let mut total = 0.0;
-    for (weight, part) in parts {
-        sum += part * (weight - top).exp();
-        total += (weight - top).exp();
-    }
-    sum / total
+    let averages = kinds.iter().filter_map(|parts| {
+        let (mut sum, mut total) = (DMatrix::zeros(k, k), 0.0);
+        for (weight, part) in parts {
+            sum += part * (weight - top).exp();
+            total += (weight - top).exp();
+        }
+        (total > 0.0).then(|| (total, sum / total))
+    });
+    let averages: Vec<(f64, DMatrix<f64>)> = averages.collect();
+    // What the data hardly tell apart must not make an error smaller.
+    let most = averages.iter().map(|(total, _)| *total).fold(0.0, f64::max);
+    let likely = averages.into_iter().filter(|(total, _)| *total > UNLIKELY * most).map(|(_, average)| average);
+    likely.reduce(|a, b| wider(&a, &b)).unwrap_or_else(none)
+}
+
+/// A kind of noise that the data make less likely than another by this is not asked how wide its errors are.
+const UNLIKELY: f64 = 0.05;
+
+/// The first of two covariances, each error at least as wide as in the second.
+fn wider(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let by: Vec<f64> = a.diagonal().iter().zip(&b.diagonal()).map(|(a, b)| (b / a).max(1.0).sqrt()).collect();
+    DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * by[i] * by[j])
 }
 
 /// The wander's correlation matrix times some columns, by one pass each way.

@@ -175,7 +175,10 @@ impl Row<'_> {
         let (value, sigma) = *fit.coefficients.last()?;
         let per = format!("{}/{}{}", self.axis.unit, covariate.unit, form.power());
         Some(Hypothesis {
-            formula: format!("({value:.3e} +- {sigma:.1e}) {per} x {}", form.words(&covariate.name, *lag_s)),
+            formula: format!(
+                "({value:.3e} +- {sigma:.1e}) {per} x {}",
+                form.words(&covariate.name, &covariate.values, *lag_s)
+            ),
             axis: self.axis.name.clone(),
             unit: self.axis.unit.clone(),
             location: format!(

@@ -221,9 +221,13 @@ fn forms(series: &Series) -> Vec<Follows> {
     let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
     let lags_s: Vec<f64> = [0.0].into_iter().chain(LAGS.map(|part| part * span_s)).collect();
     let of_one = |(k, covariate): (usize, &CovariateSeries)| {
-        let listed = |form: &Form| *form == Form::Linear && (covariate.is_temperature() || covariate.is_magnetic());
+        let is_listed = covariate.is_temperature() || covariate.is_magnetic();
+        let listed = |form: &Form| *form == Form::Linear && is_listed;
         let forms = Form::ALL.into_iter().filter(|form| !listed(form));
-        forms.flat_map(|form| lags_s.iter().map(move |lag_s| Follows::Form(form, k, *lag_s))).collect::<Vec<Follows>>()
+        let late = |form: Form| if form.may_be_late() { &lags_s[..] } else { &lags_s[..1] };
+        forms
+            .flat_map(|form| late(form).iter().map(move |lag_s| Follows::Form(form, k, *lag_s)))
+            .collect::<Vec<Follows>>()
     };
     series.covariates.iter().enumerate().flat_map(of_one).collect()
 }

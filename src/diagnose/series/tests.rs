@@ -40,6 +40,15 @@ fn red(rng: &mut ChaCha12Rng, memory: f64, white: f64) -> Vec<f64> {
     (0..BLOCKS).map(|_| next()).collect()
 }
 
+/// Wanders of every memory, as much of each.
+fn flicker(rng: &mut ChaCha12Rng, white: f64) -> Vec<f64> {
+    let mut sum = red(rng, 0.3, white);
+    for memory in [1.0, 4.0, 16.0, 64.0, 256.0] {
+        sum.iter_mut().zip(red(rng, memory, 0.0)).for_each(|(sum, x)| *sum += x);
+    }
+    sum
+}
+
 /// The first effect found with its coefficient and inner number.
 fn first(series: &Series, axis: &Axis) -> Option<(Follows, (f64, f64), AxisFound)> {
     let found = search(series, axis, &[]);
@@ -63,9 +72,13 @@ fn alarms_in_red_noise(seeds: u64) {
     for seed in 0..seeds {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
         let mut series = series(&mut rng);
-        let memory = MEMORIES[seed as usize % 5];
-        let values = red(&mut rng, memory, [0.0, 0.3][seed as usize / 5 % 2]);
-        for (name, unit, memory) in [("humidity", "%", 40.0), ("pressure", "hPa", 150.0)] {
+        let white = [0.0, 0.3][seed as usize / 5 % 2];
+        let memory = MEMORIES.get(seed as usize % 6).copied();
+        let values = match memory {
+            Some(memory) => red(&mut rng, memory, white),
+            None => flicker(&mut rng, white),
+        };
+        for (name, unit, memory) in [("humidity", "%", 40.0), ("pressure", "hPa", 150.0), ("mag_x", "uT", 5.0)] {
             series.covariates.push(covariate(name, unit, red(&mut rng, memory, 0.1)));
         }
         let found = search(&series, &axis(values), &[]);
@@ -207,6 +220,46 @@ fn a_delayed_response_gives_its_delay() {
     assert!(named == 10 && within >= 8, "{named} named, {within} within");
 }
 
+/// Two components of a field that a sensor feels are one effect, with a coefficient each, beside a temperature that it feels too.
+#[test]
+fn a_sensor_that_feels_the_field_has_a_coefficient_for_each_component() {
+    let (mut named, mut within) = (0, 0);
+    for seed in 0..10 {
+        let mut rng = ChaCha12Rng::seed_from_u64(seed);
+        let mut series = series(&mut rng);
+        for name in ["mag_x", "mag_y", "mag_z"] {
+            series.covariates.push(covariate(name, "uT", red(&mut rng, 6.0, 0.1)));
+        }
+        let of = |k: usize, i: usize| series.covariates[k].values[i];
+        let noise = red(&mut rng, 10.0, 0.3);
+        let values: Vec<f64> =
+            noise.iter().enumerate().map(|(i, n)| 0.3 * n + 0.9 * of(1, i) - 0.7 * of(3, i) + 0.6 * of(0, i)).collect();
+        let found = search(&series, &axis(values), &[]);
+        let coefficient = |wanted: Follows| {
+            let place = found.effects.iter().position(|(follows, _)| *follows == wanted)?;
+            Some(found.last().coefficients[place])
+        };
+        let [Some(x), Some(z), None] = [1, 3, 2].map(|k| coefficient(Follows::Field(k))) else { continue };
+        named += usize::from(found.effects.iter().any(|(f, _)| f.id() == "temperature_bias") && found.form.is_none());
+        within += usize::from((x.0 - 0.9).abs() < 2.0 * x.1) + usize::from((z.0 + 0.7).abs() < 2.0 * z.1);
+    }
+    assert!(named >= 9 && within >= 16, "{named} named, {within} within");
+}
+
+/// What a temperature does it does within hours.
+#[test]
+fn no_lag_of_days_is_a_bias_that_follows_temperature() {
+    for seed in 0..5 {
+        let mut rng = ChaCha12Rng::seed_from_u64(seed);
+        let series = series(&mut rng);
+        let late = super::follow::equation(&series, &axis(vec![0.0; BLOCKS]), &[Follows::Temperature(0, 90_000.0)]);
+        let values = red(&mut rng, 5.0, 0.2).iter().zip(&late.columns[0]).map(|(n, x)| 0.02 * n + 3.0 * x).collect();
+        let found = search(&series, &axis(values), &[]);
+        let lags = found.effects.iter().filter(|(f, _)| f.id() == "temperature_bias").filter_map(|(f, _)| f.inner());
+        assert!(lags.into_iter().all(|lag_s| lag_s <= 28_800.0), "{:?}", found.effects);
+    }
+}
+
 /// What is in no catalogue is no effect of temperature, though temperature is among the covariates and not far from it.
 #[test]
 fn a_sensor_that_follows_something_else_has_a_formula_and_no_name() {
@@ -219,8 +272,16 @@ fn a_sensor_that_follows_something_else_has_a_formula_and_no_name() {
             let humidity = series.covariates[0].values.iter().zip(own).map(|(t, own)| 0.5 * (t - 25.0) + own).collect();
             series.covariates.push(covariate("humidity", "%", humidity));
             let noise = red(&mut rng, 10.0, 0.3);
-            let follows = |x: &f64| if form == Form::Square { x * x } else { *x };
-            let values = series.covariates[1].values.iter().zip(noise).map(|(x, n)| follows(x) + 0.3 * n).collect();
+            let follows = |x: &f64| match form {
+                Form::Linear => *x,
+                Form::Square => x * x,
+                Form::Cube => 0.3 * x.powi(3),
+                Form::Play(_) => 0.0,
+            };
+            let with = super::follow::equation(&series, &axis(vec![0.0; BLOCKS]), &[Follows::Form(form, 1, 0.0)]);
+            let follows = |i: usize, x: &f64| if form.may_be_late() { follows(x) } else { with.columns[0][i] };
+            let humid = series.covariates[1].values.iter().enumerate();
+            let values = humid.zip(noise).map(|((i, x), n)| follows(i, x) + 0.3 * n).collect();
             let found = search(&series, &axis(values), &[]);
             let is = |follows: Follows| matches!(follows, Follows::Form(f, 1, _) if f == form);
             right += usize::from(found.effects.is_empty() && found.form.is_some_and(|(follows, ..)| is(follows)));
