@@ -3,6 +3,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 
 use super::*;
+use crate::diagnose::answer::Verdict;
 
 const G: f64 = 9.80665;
 
