@@ -209,6 +209,9 @@ impl Frame {
 
     /// The same data with what flips say.
     fn and_flips(mut self, flips: &[Flips; 3]) -> Self {
+        if flips.iter().all(|flips| flips.rest.is_empty()) {
+            return self;
+        }
         for (part, flips) in self.data.parts.iter_mut().flatten().zip(flips) {
             part.flips.clone_from(&flips.rest);
         }
