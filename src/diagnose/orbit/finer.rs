@@ -2,7 +2,8 @@
 //! relativistic term. A satellite feels both; a recording that was made by another program may hold neither, and the lack of what is
 //! always in would be named as something else.
 //!
-//! Both are in unless the recording, beside the fullest model of everything else, is far better without.
+//! Both are in unless the recording is better without: beside the fullest model of everything else, or, where radiation or air was named,
+//! by a second search that needs less of those. The second look doubles the time of such a case.
 
 use super::arc::{Arc, ArcFit};
 use super::forces::{Baseline, Finer, Term};
