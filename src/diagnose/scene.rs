@@ -6,6 +6,7 @@
 use std::ops::Deref;
 use std::sync::Arc;
 
+use crate::math::shared_work;
 use crate::physics::{self, Mat3, Vec3};
 use crate::units::NANO_G_M_S2;
 
@@ -322,13 +323,12 @@ fn bodies(q: &[[f64; 4]]) -> Result<Vec<Mat3>, CaseError> {
 }
 
 fn fields(unix: &[f64], r_m: &[Vec3], body: &[Mat3]) -> Result<Vec<Vec3>, CaseError> {
-    (0..unix.len())
-        .map(|i| {
-            physics::magnetic::geomagnetic_field_t(unix[i], &r_m[i]).map(|b| body[i] * b).map_err(|e| {
-                CaseError::Numeric(format!("case.toml: `case.epoch_utc` or a position is out of range: {e}"))
-            })
+    let at = |i: usize| {
+        physics::magnetic::geomagnetic_field_t(unix[i], &r_m[i]).map(|b| body[i] * b).map_err(|e| {
+            CaseError::Numeric(format!("case.toml: `case.epoch_utc` or a position is out of range: {e}"))
         })
-        .collect()
+    };
+    shared_work::map_range(unix.len(), at).into_iter().collect()
 }
 
 fn drag_ng(vehicle: &physics::vehicle::Vehicle, density_kg_m3: f64, relative_body_m_s: &Vec3) -> Vec3 {

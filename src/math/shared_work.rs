@@ -15,6 +15,11 @@ pub fn map<'a, T: Sync, U: Send>(items: &'a [T], of: impl Fn(&'a T) -> U + Sync 
     items.par_iter().with_max_len(1).map(of).collect()
 }
 
+/// The result of each index below `n`, in their order, where one is little work.
+pub fn map_range<U: Send>(n: usize, of: impl Fn(usize) -> U + Sync + Send) -> Vec<U> {
+    (0..n).into_par_iter().map(of).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -24,6 +29,7 @@ mod tests {
         let items: Vec<u64> = (0..10_000).collect();
         let squares = map(&items, |n| n * n);
         assert!(items.iter().zip(&squares).all(|(n, square)| n * n == *square));
+        assert_eq!(map_range(items.len(), |n| items[n] * items[n]), squares);
         assert_eq!(both(|| squares.len(), || "b"), (10_000, "b"));
     }
 }

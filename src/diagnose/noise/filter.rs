@@ -8,16 +8,34 @@ use super::{AxisNoise, Loudness, Schedule, Stretch};
 /// Windows between two looks at whether all of them are over.
 const CHUNK: usize = 64;
 
-/// Values become their whitened innovations, all by one filter.
+/// Whitened innovations of the next values of several series, all by one filter, each in a lane of its own.
 #[multiversion(targets("x86_64+avx+avx2"))]
 fn whiten_chunk<const L: usize, const R: usize>(
     memory: &mut Memory<L, R>,
     rows: &[Row<1, R>],
-    values: &mut [[f64; L]],
+    values: [&[f64]; L],
+    innovations: &mut [[f32; CHUNK]; L],
 ) {
-    for (value, row) in values.iter_mut().zip(rows) {
-        *value = memory.whiten_alike(row, *value);
+    let n = rows.len().min(CHUNK);
+    let values = values.map(|lane| &lane[..n]);
+    for i in 0..n {
+        let whitened = memory.whiten_alike(&rows[i], std::array::from_fn(|l| values[l][i]));
+        for l in 0..L {
+            innovations[l][i] = whitened[l] as f32;
+        }
     }
+}
+
+/// Largest magnitude; what is no number is passed over.
+#[multiversion(targets("x86_64+avx+avx2"))]
+fn largest(values: &[f32]) -> f32 {
+    let greater = |a: f32, b: f32| if b > a { b } else { a };
+    let (chunks, mut lanes) = (values.chunks_exact(8), [0.0_f32; 8]);
+    let rest = chunks.remainder().iter().fold(0.0, |m, w| greater(m, w.abs()));
+    for chunk in chunks {
+        (0..8).for_each(|j| lanes[j] = greater(lanes[j], chunk[j].abs()));
+    }
+    lanes.into_iter().fold(rest, greater)
 }
 
 /// Where what a filter remembers of a series is negligible.
@@ -37,10 +55,7 @@ impl Tail {
     /// Goes on over innovations, the first of which is that of window `at`.
     fn follow(&mut self, innovations: &[f32], at: usize) {
         let inside = self.last.saturating_sub(at).min(innovations.len());
-        for w in &innovations[..inside] {
-            let w = w.abs();
-            self.largest = if w > self.largest { w } else { self.largest };
-        }
+        self.largest = largest(&innovations[..inside]).max(self.largest);
         for (i, w) in innovations.iter().enumerate().skip(inside) {
             if self.end.is_some() {
                 return;
@@ -145,22 +160,29 @@ fn whiten_stretches<const L: usize, const R: usize>(rows: &[Row<1, R>], series: 
     let mut memory = Memory::new();
     let mut out: [Vec<f32>; L] = std::array::from_fn(|_| Vec::with_capacity(n - begin));
     let mut tails = series.map(Tail::new);
+    let (mut partly, mut innovations) = ([[0.0; CHUNK]; L], [[0.0; CHUNK]; L]);
     for chunk in (begin..n).step_by(CHUNK) {
         let end = (chunk + CHUNK).min(n);
-        let mut values = [[0.0; L]; CHUNK];
-        for (l, series) in series.iter().enumerate() {
+        let mut lanes: [&[f64]; L] = [&[]; L];
+        for ((lane, partly), series) in lanes.iter_mut().zip(&mut partly).zip(&series) {
             let (from, to) = (series.first.max(chunk), series.end().min(end));
-            if from < to {
-                let inside = &series.values[from - series.first..to - series.first];
-                values[from - chunk..].iter_mut().zip(inside).for_each(|(value, x)| value[l] = *x);
+            if (from, to) == (chunk, end) {
+                *lane = &series.values[from - series.first..to - series.first];
+                continue;
             }
+            partly.fill(0.0);
+            if from < to {
+                partly[from - chunk..to - chunk].copy_from_slice(&series.values[from - series.first..to - series.first]);
+            }
+            *lane = &partly[..end - chunk];
         }
-        whiten_chunk(&mut memory, &rows[chunk..end], &mut values);
-        for (l, out) in out.iter_mut().enumerate() {
-            out.extend(values[..end - chunk].iter().map(|value| value[l] as f32));
-        }
-        for (tail, out) in tails.iter_mut().zip(&out).filter(|(tail, _)| tail.last < n) {
-            tail.follow(&out[chunk - begin..], chunk);
+        whiten_chunk(&mut memory, &rows[chunk..end], lanes, &mut innovations);
+        for ((out, tail), innovations) in out.iter_mut().zip(&mut tails).zip(&innovations) {
+            let innovations = &innovations[..end - chunk];
+            out.extend_from_slice(innovations);
+            if tail.last < n {
+                tail.follow(innovations, chunk);
+            }
         }
         if end > rest && tails.iter().all(|tail| tail.end.is_some()) {
             break;
