@@ -181,7 +181,11 @@ impl<'a> Chosen<'a> {
     }
 
     fn overlap(&self, column: &Column) -> DVector<f64> {
-        let products = DVector::from_iterator(self.columns.len(), self.columns.iter().map(|c| c.dot(column)));
+        self.overlap_of(DVector::from_iterator(self.columns.len(), self.columns.iter().map(|c| c.dot(column))))
+    }
+
+    /// The same of the products with the columns chosen.
+    fn overlap_of(&self, products: DVector<f64>) -> DVector<f64> {
         match &self.cholesky {
             Some(c) => c.l_dirty().solve_lower_triangular(&products).unwrap_or(products),
             None => products,
@@ -200,18 +204,27 @@ impl<'a> Chosen<'a> {
 
     /// The same, from what they are before the data of the frame and beside nothing.
     pub fn beside(&self, columns: &[Column], alone: &Normal) -> Normal {
+        self.reduced(columns, self.before_its_data(columns, alone))
+    }
+
+    /// Normal equations before the data of the frame, before those less the columns of amplitude one.
+    fn before_its_data(&self, columns: &[Column], alone: &Normal) -> Normal {
         let mut normal = alone.clone();
         for column in &self.fixed {
             normal.y.iter_mut().zip(columns).for_each(|(y, c)| *y -= c.dot(column));
         }
-        self.reduced(columns, normal)
+        normal
     }
 
-    fn reduced(&self, columns: &[Column], mut normal: Normal) -> Normal {
+    fn reduced(&self, columns: &[Column], normal: Normal) -> Normal {
         if self.columns.is_empty() {
             return normal;
         }
-        let overlaps: Vec<DVector<f64>> = columns.iter().map(|c| self.overlap(c)).collect();
+        self.less_overlaps(&columns.iter().map(|c| self.overlap(c)).collect::<Vec<_>>(), normal)
+    }
+
+    /// Normal equations less what the columns chosen have of each column.
+    fn less_overlaps(&self, overlaps: &[DVector<f64>], mut normal: Normal) -> Normal {
         for (i, overlap) in overlaps.iter().enumerate() {
             normal.y[i] -= overlap.dot(&self.reduced);
             for (j, other) in overlaps.iter().enumerate() {
@@ -249,5 +262,50 @@ impl<'a> Chosen<'a> {
             }
             None => (DVector::zeros(0), DMatrix::zeros(0, 0)),
         }
+    }
+}
+
+/// Several choices that the same columns are tried beside: a column which more than one of them has is multiplied once.
+pub struct Choices<'a> {
+    chosen: Vec<Chosen<'a>>,
+    distinct: Vec<&'a Column>,
+    /// Where each choice has its columns among them.
+    places: Vec<Vec<usize>>,
+}
+
+impl<'a> Choices<'a> {
+    /// From the choices.
+    pub fn new(chosen: Vec<Chosen<'a>>) -> Self {
+        let mut distinct: Vec<&Column> = Vec::new();
+        let mut place = |column: &'a Column| {
+            distinct.iter().position(|other| other.is(column)).unwrap_or_else(|| {
+                distinct.push(column);
+                distinct.len() - 1
+            })
+        };
+        let places = chosen.iter().map(|choice| choice.columns.iter().map(|c| place(c)).collect()).collect();
+        Self { chosen, distinct, places }
+    }
+
+    /// [`Chosen::beside`] of each choice of `which`.
+    pub fn beside(&self, which: &[usize], columns: &[Column], alone: &Normal) -> Vec<Normal> {
+        let mut products: Vec<Option<Vec<f64>>> = vec![None; self.distinct.len()];
+        let beside = |choice: &usize| {
+            let (chosen, places) = (&self.chosen[*choice], &self.places[*choice]);
+            let normal = chosen.before_its_data(columns, alone);
+            if places.is_empty() {
+                return normal;
+            }
+            for place in places {
+                products[*place]
+                    .get_or_insert_with(|| columns.iter().map(|column| self.distinct[*place].dot(column)).collect());
+            }
+            let overlap = |i: usize| {
+                let of_place = |place: &usize| products[*place].as_ref().map_or(0.0, |of_columns| of_columns[i]);
+                chosen.overlap_of(DVector::from_iterator(places.len(), places.iter().map(of_place)))
+            };
+            chosen.less_overlaps(&(0..columns.len()).map(overlap).collect::<Vec<_>>(), normal)
+        };
+        which.iter().map(beside).collect()
     }
 }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-pub use chosen::{Chosen, Normal};
+pub use chosen::{Choices, Chosen, Normal};
 
 use crate::diagnose::noise::{AxisNoise, Flips, Loudness, Schedule, Stretch, Whitener, dot};
 use crate::diagnose::scene::{Axes, Measured};
@@ -80,6 +80,15 @@ impl Column {
         let parts = self.parts.iter().zip(&other.parts).filter_map(|(a, b)| Some((a.as_ref()?, b.as_ref()?)));
         let product = |(a, b): (&Part, &Part)| -> f64 { a.flips.iter().zip(&b.flips).map(|(a, b)| a * b).sum() };
         parts.map(|(a, b)| a.factor * b.factor * product((a, b))).sum()
+    }
+
+    /// Whether this is another view of the same whitened series at the same size.
+    fn is(&self, other: &Column) -> bool {
+        self.parts.iter().zip(&other.parts).all(|parts| match parts {
+            (Some(a), Some(b)) => Arc::ptr_eq(&a.whitened, &b.whitened) && a.factor == b.factor,
+            (None, None) => true,
+            _ => false,
+        })
     }
 
     /// This column times `factor`.
