@@ -324,9 +324,9 @@ fn bodies(q: &[[f64; 4]]) -> Result<Vec<Mat3>, CaseError> {
 
 fn fields(unix: &[f64], r_m: &[Vec3], body: &[Mat3]) -> Result<Vec<Vec3>, CaseError> {
     let at = |i: usize| {
-        physics::magnetic::geomagnetic_field_t(unix[i], &r_m[i]).map(|b| body[i] * b).map_err(|e| {
-            CaseError::Numeric(format!("case.toml: `case.epoch_utc` or a position is out of range: {e}"))
-        })
+        physics::magnetic::geomagnetic_field_t(unix[i], &r_m[i])
+            .map(|b| body[i] * b)
+            .map_err(|e| CaseError::Numeric(format!("case.toml: `case.epoch_utc` or a position is out of range: {e}")))
     };
     shared_work::map_range(unix.len(), at).into_iter().collect()
 }

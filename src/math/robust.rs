@@ -224,9 +224,10 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     if values.is_empty() {
         return None;
     }
-    values.sort_unstable_by(f64::total_cmp);
-    let half = values.len() / 2;
-    Some(if values.len() % 2 == 1 { values[half] } else { 0.5 * (values[half - 1] + values[half]) })
+    let (half, odd) = (values.len() / 2, values.len() % 2 == 1);
+    let (below, upper, _) = values.select_nth_unstable_by(half, f64::total_cmp);
+    let lower = if odd { None } else { below.iter().copied().max_by(f64::total_cmp) };
+    Some(lower.map_or(*upper, |lower| 0.5 * (lower + *upper)))
 }
 
 #[cfg(test)]
@@ -235,6 +236,17 @@ mod tests {
     use proptest::prelude::*;
     use rand::{RngExt, SeedableRng};
     use statrs::distribution::{ContinuousCDF, Normal};
+
+    proptest! {
+        #[test]
+        fn the_median_is_the_middle_of_what_is_sorted(values in proptest::collection::vec(-1e3..1e3, 1..60)) {
+            let mut sorted = values.clone();
+            sorted.sort_by(f64::total_cmp);
+            let half = sorted.len() / 2;
+            let middle = if sorted.len() % 2 == 1 { sorted[half] } else { 0.5 * (sorted[half - 1] + sorted[half]) };
+            prop_assert_eq!(median(&mut values.clone()), Some(middle));
+        }
+    }
 
     fn q_of(counts: Vec<i16>) -> Option<f64> {
         tail_statistic(Pair([&Ranked::of(counts), &Ranked::default()]))

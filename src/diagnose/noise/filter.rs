@@ -9,7 +9,7 @@ use super::{AxisNoise, Loudness, Schedule, Stretch};
 const CHUNK: usize = 64;
 
 /// Whitened innovations of the next values of several series, all by one filter, each in a lane of its own.
-#[multiversion(targets("x86_64+avx+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+avx+avx2", "x86_64+avx+avx2"))]
 fn whiten_chunk<const L: usize, const R: usize>(
     memory: &mut Memory<L, R>,
     rows: &[Row<1, R>],
@@ -27,7 +27,7 @@ fn whiten_chunk<const L: usize, const R: usize>(
 }
 
 /// Largest magnitude; what is no number is passed over.
-#[multiversion(targets("x86_64+avx+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+avx+avx2", "x86_64+avx+avx2"))]
 fn largest(values: &[f32]) -> f32 {
     let greater = |a: f32, b: f32| if b > a { b } else { a };
     let (chunks, mut lanes) = (values.chunks_exact(8), [0.0_f32; 8]);
@@ -172,7 +172,8 @@ fn whiten_stretches<const L: usize, const R: usize>(rows: &[Row<1, R>], series: 
             }
             partly.fill(0.0);
             if from < to {
-                partly[from - chunk..to - chunk].copy_from_slice(&series.values[from - series.first..to - series.first]);
+                partly[from - chunk..to - chunk]
+                    .copy_from_slice(&series.values[from - series.first..to - series.first]);
             }
             *lane = &partly[..end - chunk];
         }

@@ -76,7 +76,7 @@ pub(super) fn products<const L: usize>(
 }
 
 /// The same with so many resonances.
-#[multiversion(targets("x86_64+avx+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+avx+avx2", "x86_64+avx+avx2"))]
 fn products_with<const L: usize, const R: usize>(
     noise: &[AxisNoise; L],
     schedule: &Schedule,

@@ -316,7 +316,7 @@ const BOUNDS: [[f64; 2]; 4] = [[-6.0, 3.0], [2.0, 7.0], [-9.0, 4.0], [5.0, 10.5]
 const MIDDLE: [f64; 4] = [-2.0, 4.5, -2.5, 7.5];
 
 /// Dot product.
-#[multiversion(targets("x86_64+avx+avx2"))]
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+avx+avx2", "x86_64+avx+avx2"))]
 pub fn dot<A: Copy + Into<f64>, B: Copy + Into<f64>>(a: &[A], b: &[B]) -> f64 {
     let mut lanes = [0.0; 8];
     let (ca, cb) = (a.chunks_exact(8), b.chunks_exact(8));
