@@ -111,6 +111,11 @@ pub struct Made {
 }
 
 impl Made {
+    /// A position every quarter of an hour, with all the finer terms.
+    pub fn every_quarter(date: (i32, u32, u32), hours: f64, satellites: Vec<Satellite>) -> Self {
+        Self { date, spacing_s: 900.0, hours, satellites, finer: Finer::ALL }
+    }
+
     pub fn sp3(&self) -> String {
         let (year, month, day) = self.date;
         let origin = GpsInstant::from_calendar(year, month, day, 0.0).expect("a date");
@@ -185,13 +190,7 @@ fn close(answer: &Answer, effect: usize, name: &str, truth: f64) {
 
 #[test]
 fn a_full_model_of_another_year_lacks_nothing() {
-    let made = Made {
-        date: (2023, 3, 20),
-        spacing_s: 900.0,
-        hours: 36.0,
-        satellites: vec![gps("G07", 10.0, 50.0)],
-        finer: Finer::ALL,
-    };
+    let made = Made::every_quarter((2023, 3, 20), 36.0, vec![gps("G07", 10.0, 50.0)]);
     let answer = made.diagnose(&ALL);
     assert_eq!((answer.verdict, ids(&answer)), (Verdict::Consistent, vec![]));
     assert!(answer.arcs[0].rms_after < 2.0 * SIGMA_M, "{}", answer.arcs[0].rms_after);
@@ -204,7 +203,7 @@ fn a_computed_orbit_without_tides_lacks_nothing_and_is_told() {
     low.start = circular(5_900e3, 52.6, 40.0, 20.0);
     low.terms.truncate(1);
     let neither = Finer { tide: false, relativity: false };
-    let made = Made { date: (2015, 4, 9), spacing_s: 300.0, hours: 30.0, satellites: vec![low], finer: neither };
+    let made = Made { spacing_s: 300.0, finer: neither, ..Made::every_quarter((2015, 4, 9), 30.0, vec![low]) };
     let answer = made.diagnose(&["gravity:12", "sun", "moon", "solar_radiation_pressure"]);
     assert_eq!((answer.verdict, ids(&answer)), (Verdict::Consistent, vec![]), "{:?}", answer.notes);
     assert!(
@@ -217,13 +216,7 @@ fn a_computed_orbit_without_tides_lacks_nothing_and_is_told() {
 /// One position a metre off between quarters of an hour is left out, and counted.
 #[test]
 fn a_position_that_is_off_by_a_metre_is_left_out() {
-    let made = Made {
-        date: (2023, 3, 20),
-        spacing_s: 900.0,
-        hours: 36.0,
-        satellites: vec![gps("G07", 10.0, 50.0)],
-        finer: Finer::ALL,
-    };
+    let made = Made::every_quarter((2023, 3, 20), 36.0, vec![gps("G07", 10.0, 50.0)]);
     let sp3 = made.sp3();
     let places: Vec<usize> = sp3.match_indices("PG07").map(|(place, _)| place).collect();
     let x = places[50] + 4..places[50] + 18;
@@ -240,8 +233,7 @@ fn a_velocity_step_of_one_satellite_is_named_there_and_nowhere_else() {
     let mut satellites = vec![gps("G01", 0.0, 10.0), gps("G02", 120.0, 200.0), gps("G03", 240.0, 320.0)];
     let kick = Impulse { at_s: 52_345.0, dv_m_s: Vector3::new(0.03, -0.11, 0.05) };
     satellites[1].kick = Some(kick);
-    let answer =
-        Made { date: (2019, 11, 2), spacing_s: 900.0, hours: 36.0, satellites, finer: Finer::ALL }.diagnose(&ALL);
+    let answer = Made::every_quarter((2019, 11, 2), 36.0, satellites).diagnose(&ALL);
     assert_eq!((answer.verdict, ids(&answer)), (Verdict::Explained, vec!["manoeuvre"]));
     let verdicts: Vec<Verdict> = answer.arcs.iter().map(|a| a.verdict).collect();
     assert_eq!(verdicts, [Verdict::Consistent, Verdict::Explained, Verdict::Consistent]);
@@ -259,7 +251,7 @@ fn a_push_of_one_satellite_alone_is_named_there() {
         satellite.terms.retain(|(term, _)| *term != Term::YBias);
     }
     satellites[2].terms.push((Term::YBias, [Y_M_S2, 0.0]));
-    let made = Made { date: (2018, 5, 14), spacing_s: 900.0, hours: 40.0, satellites, finer: Finer::ALL };
+    let made = Made::every_quarter((2018, 5, 14), 40.0, satellites);
     let answer = made.diagnose(&without("srp_y_bias"));
     assert_eq!((answer.verdict, ids(&answer)), (Verdict::Explained, vec!["srp_y_bias"]), "{:?}", answer.notes);
     let verdicts: Vec<Verdict> = answer.arcs.iter().map(|a| a.verdict).collect();
@@ -290,7 +282,7 @@ fn what_an_odd_satellite_alone_asks_for_and_is_not_explained_by_is_not_named() {
     let states = satellites[0].fly(&environment, &baseline, &t_s);
     satellites[0].kick = Some(along(6e-5, 66_000.0, &states));
     satellites[0].second = Some(along(6e-5, 88_000.0, &states));
-    let made = Made { date: (2018, 2, 21), spacing_s: 900.0, hours: 30.0, satellites, finer: Finer::ALL };
+    let made = Made::every_quarter((2018, 2, 21), 30.0, satellites);
     let answer = made.diagnose(&["gravity:12", "sun", "moon", "solar_radiation_pressure"]);
     assert_eq!((answer.verdict, ids(&answer)), (Verdict::Unexplained, vec![]), "{:?}", answer.effects);
     let verdicts: Vec<Verdict> = answer.arcs.iter().map(|a| a.verdict).collect();
@@ -301,8 +293,7 @@ fn what_an_odd_satellite_alone_asks_for_and_is_not_explained_by_is_not_named() {
 fn sunlight_is_found_beside_a_velocity_step_of_the_only_satellite() {
     let mut satellite = gps("E11", 77.0, 150.0);
     satellite.kick = Some(Impulse { at_s: 71_000.0, dv_m_s: Vector3::new(-0.02, 0.01, 0.06) });
-    let made =
-        Made { date: (2021, 6, 21), spacing_s: 900.0, hours: 40.0, satellites: vec![satellite], finer: Finer::ALL };
+    let made = Made::every_quarter((2021, 6, 21), 40.0, vec![satellite]);
     let answer = made.diagnose(&["gravity:12", "sun", "moon", "srp_y_bias", "srp_b_bias"]);
     let mut named = ids(&answer);
     named.sort_unstable();
@@ -311,13 +302,7 @@ fn sunlight_is_found_beside_a_velocity_step_of_the_only_satellite() {
 
 #[test]
 fn the_moon_is_missed_across_a_leap_second() {
-    let made = Made {
-        date: (2016, 12, 31),
-        spacing_s: 900.0,
-        hours: 36.0,
-        satellites: vec![gps("R05", 33.0, 0.0)],
-        finer: Finer::ALL,
-    };
+    let made = Made::every_quarter((2016, 12, 31), 36.0, vec![gps("R05", 33.0, 0.0)]);
     let answer = made.diagnose(&without("moon"));
     assert_eq!(ids(&answer), ["third_body_moon"]);
     close(&answer, 0, "fraction", 1.0);
@@ -327,8 +312,7 @@ fn the_moon_is_missed_across_a_leap_second() {
 fn degrees_are_missed_at_the_height_of_glonass() {
     let mut satellite = gps("R09", 200.0, 90.0);
     satellite.start = circular(19_130e3, 64.8, 200.0, 90.0);
-    let made =
-        Made { date: (2012, 9, 9), spacing_s: 900.0, hours: 30.0, satellites: vec![satellite], finer: Finer::ALL };
+    let made = Made::every_quarter((2012, 9, 9), 30.0, vec![satellite]);
     let mut includes = without("gravity:12");
     includes.push("gravity:4");
     let answer = made.diagnose(&includes);
@@ -340,8 +324,7 @@ fn degrees_are_missed_at_the_height_of_glonass() {
 fn the_sun_is_missed_in_the_geostationary_ring() {
     let mut satellite = gps("C01", 0.0, 140.0);
     satellite.start = circular(35_786e3, 1.5, 60.0, 80.0);
-    let made =
-        Made { date: (2020, 1, 15), spacing_s: 900.0, hours: 48.0, satellites: vec![satellite], finer: Finer::ALL };
+    let made = Made::every_quarter((2020, 1, 15), 48.0, vec![satellite]);
     let answer = made.diagnose(&without("sun"));
     assert_eq!(ids(&answer), ["third_body_sun"]);
 }
@@ -360,7 +343,7 @@ fn low() -> Satellite {
 
 #[test]
 fn drag_is_missed_in_a_low_orbit() {
-    let made = Made { date: (2008, 5, 14), spacing_s: 300.0, hours: 24.0, satellites: vec![low()], finer: Finer::ALL };
+    let made = Made { spacing_s: 300.0, ..Made::every_quarter((2008, 5, 14), 24.0, vec![low()]) };
     let answer = made.diagnose(&["gravity:12", "sun", "moon", "solar_radiation_pressure"]);
     assert_eq!((answer.verdict, ids(&answer)), (Verdict::Explained, vec!["aerodynamic_drag"]));
     close(&answer, 0, "fraction", 1.7);
@@ -368,20 +351,18 @@ fn drag_is_missed_in_a_low_orbit() {
 
 #[test]
 fn a_low_orbit_is_followed_from_sparse_positions() {
-    let made = Made { date: (2008, 5, 14), spacing_s: 900.0, hours: 24.0, satellites: vec![low()], finer: Finer::ALL };
+    let made = Made::every_quarter((2008, 5, 14), 24.0, vec![low()]);
     let answer = made.diagnose(&["gravity:12", "sun", "moon", "solar_radiation_pressure", "aerodynamic_drag"]);
     assert_eq!((answer.verdict, ids(&answer)), (Verdict::Consistent, vec![]));
 }
 
 #[test]
 fn gaps_absent_and_wrong_positions_are_left_out_and_counted() {
-    let made = Made {
-        date: (2015, 7, 7),
-        spacing_s: 900.0,
-        hours: 36.0,
-        satellites: vec![gps("G01", 0.0, 10.0), gps("G02", 120.0, 200.0), gps("G03", 240.0, 320.0)],
-        finer: Finer::ALL,
-    };
+    let made = Made::every_quarter(
+        (2015, 7, 7),
+        36.0,
+        vec![gps("G01", 0.0, 10.0), gps("G02", 120.0, 200.0), gps("G03", 240.0, 320.0)],
+    );
     let mut lines: Vec<String> = made.sp3().lines().map(str::to_owned).collect();
     let mut seen = 0;
     for line in lines.iter_mut().filter(|line| line.starts_with("PG01")) {
@@ -415,13 +396,7 @@ fn gaps_absent_and_wrong_positions_are_left_out_and_counted() {
 
 #[test]
 fn what_cannot_be_used_is_told_in_one_sentence() {
-    let made = Made {
-        date: (2015, 7, 7),
-        spacing_s: 900.0,
-        hours: 6.0,
-        satellites: vec![gps("G01", 0.0, 10.0)],
-        finer: Finer::ALL,
-    };
+    let made = Made::every_quarter((2015, 7, 7), 6.0, vec![gps("G01", 0.0, 10.0)]);
     let sp3 = made.sp3();
     let said = |text: String, includes: &[&str]| made.diagnose_text(text, includes).expect_err("an error").to_string();
     assert_eq!(said("<html>".to_owned(), &ALL), "a.sp3, line 1: expected a line starting with #, found \"<html>\"");

@@ -3,7 +3,6 @@
 use std::fmt::Write;
 use std::process::Command;
 
-use oare_ground::diagnose::orbit::forces::Finer;
 use oare_ground::physics::earth_orientation::GpsInstant;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
@@ -188,7 +187,7 @@ const ORBIT: &str = "[case]\nid = \"made\"\n[simulation]\n\
     [recording]\nkind = \"orbit_sp3\"\nfile = \"a.sp3\"\neop = \"eop.csv\"\ngravity = \"a.gfc\"\n";
 
 fn orbit(spacing_s: f64) -> Made {
-    Made { date: (2018, 4, 4), spacing_s, hours: 30.0, satellites: vec![gps("E19", 40.0, 10.0)], finer: Finer::ALL }
+    Made { spacing_s, ..Made::every_quarter((2018, 4, 4), 30.0, vec![gps("E19", 40.0, 10.0)]) }
 }
 
 fn turning() -> String {

@@ -1,9 +1,10 @@
 //! What a sensor's series may follow beside its simulation, each as a column of the regression. Not here: which of them it
 //! follows (see `search`).
 
+use super::form::Form;
 use super::read::{Axis, Series};
 use crate::diagnose::measure::relaxed;
-use crate::math::rms::rms_about_mean;
+use crate::math::rms::about_mean;
 
 /// An effect a sensor's series may show.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,19 +25,8 @@ pub enum Follows {
     Offset(f64),
     /// No effect of the catalogue: a form of a covariate, late by a time constant in seconds.
     Form(Form, usize, f64),
-}
-
-/// A form of a covariate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Form {
-    /// In proportion to it.
-    Linear,
-    /// To the square of its deviation from its mean.
-    Square,
-    /// To the third power of that.
-    Cube,
-    /// To what follows it with a slack (the play operator of Prandtl 1928) of so many tenths of its deviation.
-    Play(u8),
+    /// Neither: the product of two covariates, each less its mean.
+    Product(usize, usize),
 }
 
 impl Follows {
@@ -49,7 +39,7 @@ impl Follows {
             Self::Step(_) => "bias_step",
             Self::Scale => "scale_factor",
             Self::Offset(_) => "time_offset",
-            Self::Form(..) => "formula",
+            Self::Form(..) | Self::Product(..) => "formula",
         }
     }
 
@@ -62,16 +52,25 @@ impl Follows {
             Self::Step(_) => "A step of the bias",
             Self::Scale => "A scale factor against the reference",
             Self::Offset(_) => "A clock ahead of the reference's",
-            Self::Form(..) => "A formula",
+            Self::Form(..) | Self::Product(..) => "A formula",
+        }
+    }
+
+    /// The covariate that it is of, or both; what it is, where it is of none.
+    pub fn of_what(&self, series: &Series) -> String {
+        let name = |k: &usize| series.covariates[*k].name.clone();
+        match self {
+            Self::Temperature(k, _) | Self::Delayed(k, _) | Self::Field(k) | Self::Form(_, k, _) => name(k),
+            Self::Product(k, j) => format!("{} and {}", name(k), name(j)),
+            other => other.id().to_owned(),
         }
     }
 
     /// How many unknowns it is charged for: its coefficient, and what was looked for beside it.
     pub fn price(&self) -> f64 {
-        if matches!(self, Self::Temperature(_, 0.0) | Self::Form(.., 0.0) | Self::Field(_) | Self::Scale) {
-            1.0
-        } else {
-            2.0
+        match self {
+            Self::Temperature(_, 0.0) | Self::Form(.., 0.0) | Self::Product(..) | Self::Field(_) | Self::Scale => 1.0,
+            _ => 2.0,
         }
     }
 
@@ -92,7 +91,7 @@ impl Follows {
             | Self::Step(s)
             | Self::Offset(s)
             | Self::Form(.., s) => Some(s),
-            Self::Scale | Self::Field(_) => None,
+            Self::Scale | Self::Field(_) | Self::Product(..) => None,
         }
     }
 
@@ -114,60 +113,9 @@ impl Follows {
             Self::Drift(_) => Self::Drift(s),
             Self::Step(_) => Self::Step(s),
             Self::Offset(_) => Self::Offset(s),
-            Self::Scale | Self::Field(_) => self,
+            Self::Scale | Self::Field(_) | Self::Product(..) => self,
         }
     }
-}
-
-impl Form {
-    /// All of them.
-    pub const ALL: [Self; 6] = [Self::Linear, Self::Square, Self::Cube, Self::Play(7), Self::Play(14), Self::Play(24)];
-
-    /// Whether it may be late as well.
-    pub fn may_be_late(self) -> bool {
-        !matches!(self, Self::Play(_))
-    }
-
-    fn exponent(self) -> i32 {
-        match self {
-            Self::Linear | Self::Play(_) => 1,
-            Self::Square => 2,
-            Self::Cube => 3,
-        }
-    }
-
-    fn of(self, values: &[f64]) -> Vec<f64> {
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        let about_mean = values.iter().map(|x| x - mean);
-        let Self::Play(tenths) = self else { return about_mean.map(|x| x.powi(self.exponent())).collect() };
-        let half = 0.5 * slack(tenths, values);
-        let mut follower = values.first().map_or(0.0, |x| x - mean);
-        let follow = |x: f64| {
-            follower = follower.clamp(x - half, x + half);
-            follower
-        };
-        about_mean.map(follow).collect()
-    }
-
-    /// Its power, as it is written behind what is raised to it.
-    pub fn power(self) -> &'static str {
-        ["", "^2", "^3"][self.exponent() as usize - 1]
-    }
-
-    /// As a formula of a covariate, by its name and its values.
-    pub fn words(self, covariate: &str, values: &[f64], lag_s: f64) -> String {
-        let power = self.power();
-        let late = if lag_s > 0.0 { format!(", {lag_s:.0} s late") } else { String::new() };
-        let slack = match self {
-            Self::Play(tenths) => format!(", followed with a slack of {:.3}", slack(tenths, values)),
-            _ => String::new(),
-        };
-        format!("({covariate} - <{covariate}>){power}{slack}{late}")
-    }
-}
-
-fn slack(tenths: u8, values: &[f64]) -> f64 {
-    0.1 * f64::from(tenths) * rms_about_mean(values)
 }
 
 /// One axis to be explained: its values less what is known of them, and the columns of a model.
@@ -197,7 +145,11 @@ pub fn equation(series: &Series, axis: &Axis, model: &[Follows]) -> Equation {
         Follows::Temperature(k, lag_s) => late(t, &series.covariates[*k].values, *lag_s),
         Follows::Delayed(k, lag_s) => t.iter().map(|now| at(t, &series.covariates[*k].values, now - lag_s)).collect(),
         Follows::Field(k) => series.covariates[*k].values.clone(),
-        Follows::Form(form, k, lag_s) => late(t, &form.of(&series.covariates[*k].values), *lag_s),
+        Follows::Form(form, k, lag_s) => late(t, &form.of(t, &series.covariates[*k].values), *lag_s),
+        Follows::Product(k, j) => {
+            let [one, other] = [k, j].map(|k| about_mean(&series.covariates[*k].values));
+            one.iter().zip(&other).map(|(a, b)| a * b).collect()
+        }
         Follows::Drift(tau_s) => t.iter().map(|t| (-(t - series.t_s[0]) / tau_s).exp()).collect(),
         Follows::Step(at_s) => t.iter().map(|t| f64::from(u8::from(t >= at_s))).collect(),
         Follows::Scale => reference.clone().unwrap_or_else(none),
@@ -239,7 +191,7 @@ fn at(t_s: &[f64], x: &[f64], when: f64) -> f64 {
     weights.iter().zip(&x[from..from + 4]).map(|(w, x)| w * x).sum()
 }
 
-fn slope(t_s: &[f64], x: &[f64]) -> Vec<f64> {
+pub(super) fn slope(t_s: &[f64], x: &[f64]) -> Vec<f64> {
     let n = t_s.len();
     let one = |i: usize| {
         let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));

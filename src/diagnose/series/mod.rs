@@ -5,6 +5,7 @@
 //! covariate by chance. Not here: orbits, poses.
 
 pub mod follow;
+pub mod form;
 pub mod read;
 mod red;
 mod report;

@@ -2,7 +2,7 @@
 //! found (`search`).
 
 use super::follow::Follows;
-use super::read::{Axis, Series};
+use super::read::{Axis, CovariateSeries, Series};
 use super::search::{AxisFound, held_out, missed, regress};
 use crate::diagnose::answer::{Covariate, Hypothesis, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
@@ -126,7 +126,7 @@ impl Row<'_> {
             }
             Follows::Scale => vec![parameter("fraction", value, sigma, "1")],
             Follows::Offset(_) => vec![parameter("offset_s", value, sigma, "s")],
-            Follows::Form(..) => Vec::new(),
+            Follows::Form(..) | Follows::Product(..) => Vec::new(),
         }
     }
 
@@ -170,15 +170,22 @@ impl Row<'_> {
 
     /// The formula that it follows, where no effect of the catalogue comes near.
     fn hypothesis(&self) -> Option<Hypothesis> {
-        let (Follows::Form(form, k, lag_s), _, fit) = self.found.form.as_ref()? else { return None };
-        let covariate = &self.series.covariates[*k];
+        let (form, _, fit) = self.found.form.as_ref()?;
         let (value, sigma) = *fit.coefficients.last()?;
-        let per = format!("{}/{}{}", self.axis.unit, covariate.unit, form.power());
+        let (unit, words) = match form {
+            Follows::Form(form, k, lag_s) => {
+                let covariate = &self.series.covariates[*k];
+                (form.unit(&covariate.unit), form.words(&covariate.name, &covariate.values, *lag_s))
+            }
+            Follows::Product(k, j) => {
+                let [one, other] = [k, j].map(|k| &self.series.covariates[*k]);
+                let about = |covariate: &CovariateSeries| format!("({0} - <{0}>)", covariate.name);
+                (format!("({} {})", one.unit, other.unit), format!("{} {}", about(one), about(other)))
+            }
+            _ => return None,
+        };
         Some(Hypothesis {
-            formula: format!(
-                "({value:.3e} +- {sigma:.1e}) {per} x {}",
-                form.words(&covariate.name, &covariate.values, *lag_s)
-            ),
+            formula: format!("({value:.3e} +- {sigma:.1e}) {}/{unit} x {words}", self.axis.unit),
             axis: self.axis.name.clone(),
             unit: self.axis.unit.clone(),
             location: format!(
@@ -187,7 +194,7 @@ impl Row<'_> {
                 self.found.last().rms(),
                 fit.rms(),
                 self.axis.unit,
-                covariate.name
+                form.of_what(self.series)
             ),
         })
     }
@@ -331,14 +338,10 @@ fn located(measured: &[&Row<'_>]) -> Located {
         row.found.effects.iter().copied().chain(form).collect::<Vec<(Follows, f64)>>()
     };
     let covariates = measured.iter().flat_map(|row| {
-        let follows = |f: Follows| match f {
-            Follows::Temperature(k, _) | Follows::Delayed(k, _) | Follows::Field(k) | Follows::Form(_, k, _) => {
-                row.series.covariates[k].name.clone()
-            }
-            other => other.id().to_owned(),
+        let one = |(f, score): (Follows, f64)| {
+            let name = format!("{}: {}", row.axis.column, f.of_what(row.series));
+            Covariate { name, score }
         };
-        let one =
-            |(f, score): (Follows, f64)| Covariate { name: format!("{}: {}", row.axis.column, follows(f)), score };
         found(row).into_iter().map(one).collect::<Vec<_>>()
     });
     let onset = |row: &&&Row<'_>| {

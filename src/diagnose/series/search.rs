@@ -3,7 +3,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::follow::{Equation, Follows, Form, equation};
+use super::follow::{Equation, Follows, equation};
+use super::form::Form;
 use super::read::{Axis, CovariateSeries, Series};
 use super::red::{self, Beat};
 use crate::diagnose::earlier::REACH_S;
@@ -30,6 +31,8 @@ const HELD_OUT_S: f64 = 6.0 * 3600.0;
 const HELD_OUT_BLOCKS_MIN: f64 = 4.0;
 /// Terms of a model at most, each component of a field one.
 const TERMS_MAX: usize = 6;
+/// The same of a form, since so many more of them are looked for.
+const FORM_SCORE_MIN: f64 = 20.0;
 /// Evidence by which a form must be above all effects found: twice the logarithm of odds of twenty.
 const FORM_MARGIN: f64 = 6.0;
 const GOLDEN: f64 = 0.618_033_988_749_895;
@@ -169,7 +172,7 @@ fn best_form(
     beat: &Beat,
 ) -> Option<(Follows, f64, Regression)> {
     let (form, score) = best_of(series, axis, included, forms(series), beat).best?;
-    if score < listed + FORM_MARGIN {
+    if score < FORM_SCORE_MIN.max(listed + FORM_MARGIN) {
         return None;
     }
     let mut model = [included, &[form]].concat();
@@ -216,7 +219,7 @@ fn best_of(series: &Series, axis: &Axis, model: &[Follows], candidates: Vec<Foll
     Step { best, strongest }
 }
 
-/// Every form of every covariate that is no effect of the catalogue, at once and late.
+/// Every form of every covariate that is no effect of the catalogue, at once and late, and every product of two of them.
 fn forms(series: &Series) -> Vec<Follows> {
     let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
     let lags_s: Vec<f64> = [0.0].into_iter().chain(LAGS.map(|part| part * span_s)).collect();
@@ -229,7 +232,9 @@ fn forms(series: &Series) -> Vec<Follows> {
             .flat_map(|form| late(form).iter().map(move |lag_s| Follows::Form(form, k, *lag_s)))
             .collect::<Vec<Follows>>()
     };
-    series.covariates.iter().enumerate().flat_map(of_one).collect()
+    let n = series.covariates.len();
+    let products = (0..n).flat_map(|k| (k + 1..n).map(move |j| Follows::Product(k, j)));
+    series.covariates.iter().enumerate().flat_map(of_one).chain(products).collect()
 }
 
 fn candidates(series: &Series, axis: &Axis) -> Vec<Follows> {
