@@ -1,6 +1,6 @@
 //! `oare diagnose CASE_DIR`: what did the simulation leave out?
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
@@ -20,7 +20,7 @@ use super::output::{write, write_report};
 pub struct Args {
     /// Directory with `case.toml` and the files it names.
     case: PathBuf,
-    /// Where `diagnosis.json` goes; the case directory is never written to.
+    /// Where `diagnosis.json` goes; no file of the case is written over.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Directory for the report: `index.html` and its figures.
@@ -97,8 +97,30 @@ fn measured(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(super::DONE)
 }
 
+/// Why the answer cannot go where it is wanted: over a file of the case, into a folder, or a report among the files of the case.
+fn misplaced(args: &Args) -> Option<String> {
+    let inside = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        folder.canonicalize().ok() == args.case.canonicalize().ok()
+    };
+    if let Some(out) = &args.out {
+        if out.is_dir() {
+            return Some(format!("--out {}: expected a file, found a folder", out.display()));
+        }
+        if out.is_file() && inside(out) && out.file_name().is_none_or(|name| name != "diagnosis.json") {
+            return Some(format!("--out {}: that is a file of the case, and is not written over", out.display()));
+        }
+    }
+    let report = args.report.as_ref().filter(|report| inside(&report.join("index.html")))?;
+    Some(format!("--report {}: that is the case itself, and is not written to", report.display()))
+}
+
 /// Runs it.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if let Some(misplaced) = misplaced(&args) {
+        eprintln!("oare: {misplaced}");
+        return Ok(super::unusable());
+    }
     let text = std::fs::read_to_string(args.case.join("case.toml")).unwrap_or_default();
     if MeasuredCase::kind_of(&text, &args.set).is_some() {
         return measured(&args);
@@ -161,6 +183,12 @@ fn probability(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A value and its standard error, to three figures of the error.
+fn to_its_error(value: f64, sigma: f64) -> [String; 2] {
+    let places = if sigma > 0.0 { (2.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize } else { 6 };
+    [value, sigma].map(|x| format!("{x:.places$}"))
+}
+
 fn print_table(diagnosis: &Diagnosis) {
     let verdict = diagnosis.verdict.word();
     let from = diagnosis.false_alarm_from.map_or(String::new(), |source| format!(", by the {}", source.words()));
@@ -171,7 +199,8 @@ fn print_table(diagnosis: &Diagnosis) {
             println!("      {:<18} {axis}", "axis");
         }
         for p in &effect.parameters {
-            println!("      {:<18} {:>14.6} +- {:.6} {}", p.name, p.value, p.sigma, p.unit);
+            let [value, sigma] = to_its_error(p.value, p.sigma);
+            println!("      {:<18} {value:>14} +- {sigma} {}", p.name, p.unit);
         }
     }
     if let Some(h) = &diagnosis.hypothesis {

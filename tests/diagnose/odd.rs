@@ -83,6 +83,66 @@ fn a_single_wild_value_hides_nothing() {
     }
 }
 
+/// Twenty minutes of a hung recorder, or of a value that stands for none.
+#[test]
+fn windows_that_repeat_themselves_hide_nothing() {
+    let (value, sigma, notes) = drag(&files());
+    assert!(!notes.iter().any(|note| note.contains("repeats")), "{notes:?}");
+    for fill in [None, Some("-99999")] {
+        let hung = with_lines("recording.csv", |lines| {
+            let cells_of = |line: &str| line.split(',').map(str::to_string).collect::<Vec<String>>();
+            let last = cells_of(&lines[1500]);
+            for line in &mut lines[1501..1549] {
+                let mut cells = cells_of(line);
+                (1..cells.len()).for_each(|k| cells[k] = fill.map_or_else(|| last[k].clone(), str::to_string));
+                // Deviations are no accelerations.
+                (4..cells.len()).for_each(|k| cells[k].clone_from(&last[k]));
+                *line = cells.join(",");
+            }
+        });
+        let (beside, its_sigma, notes) = drag(&hung);
+        assert!((beside - value).abs() < 0.5 * sigma && its_sigma < 1.1 * sigma, "{fill:?}: {beside} {its_sigma}");
+        let told = |note: &String| note.contains("windows are left out: an axis repeats the same value");
+        assert!(notes.iter().any(told), "{notes:?}");
+    }
+}
+
+#[test]
+fn a_simulation_without_anything_in_it_is_told() {
+    let none = with_lines("simulation.csv", |lines| {
+        for line in &mut lines[1..] {
+            *line = format!("{},0,0,0", line.split(',').next().unwrap());
+        }
+    });
+    let notes = diagnose(&read(&none).unwrap(), &Settings::default()).unwrap().notes;
+    assert!(notes.iter().any(|note| note.contains("the simulation varies by 0.000 ng rms")), "{notes:?}");
+}
+
+/// An answer never goes over what it was made from.
+#[test]
+fn no_file_of_the_case_is_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, octets) in files() {
+        std::fs::write(folder.path().join(name), octets).unwrap();
+    }
+    let recording = folder.path().join("recording.csv");
+    let before = std::fs::read(&recording).unwrap();
+    let run = |option: &str, to: &std::path::Path| {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_oare"));
+        let output = command.arg("diagnose").arg(folder.path()).arg(option).arg(to).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let refused = |option: &str, to: &std::path::Path, why: &str| {
+        let (code, said) = run(option, to);
+        assert!(code == Some(2) && said.contains(why), "{option} {}: {code:?} {said}", to.display());
+    };
+    refused("--out", &recording, "a file of the case");
+    refused("--out", folder.path(), "found a folder");
+    refused("--report", folder.path(), "the case itself");
+    assert_eq!(std::fs::read(&recording).unwrap(), before);
+    assert_eq!(run("--out", &folder.path().join("diagnosis.json")).0, Some(0));
+}
+
 #[test]
 fn where_simulation_or_ancillary_data_have_a_hole_nothing_is_compared() {
     let (value, sigma, _) = drag(&files());

@@ -3,6 +3,7 @@
 mod air;
 mod check;
 mod fitted_law;
+mod frozen;
 mod header;
 mod motion;
 mod read;
@@ -143,6 +144,8 @@ pub struct Case {
     pub windows_too_rough: usize,
     /// Windows left out because they stand alone, far out of what is before and after them.
     pub windows_of_spikes: usize,
+    /// Windows left out because an axis repeats itself there.
+    pub windows_frozen: usize,
 }
 
 impl Deref for Case {
@@ -315,13 +318,22 @@ impl Case {
             return Err(CaseError::TooRough { file: files.simulation.clone(), common, needed });
         }
         let windows_too_rough = before - windows_in_holes - kept.clock_s.len();
-        let before = kept.clock_s.len();
-        let alike = spikes::without(&kept);
-        if alike.clock_s.len() >= WINDOWS_MIN {
-            kept = alike;
-        }
-        let windows_of_spikes = before - kept.clock_s.len();
-        Ok(Self { expected, recording: kept, windows_beyond, windows_in_holes, windows_too_rough, windows_of_spikes })
+        let [windows_frozen, windows_of_spikes] = [frozen::without, spikes::without].map(|without| {
+            let (before, alike) = (kept.clock_s.len(), without(&kept));
+            if alike.clock_s.len() >= WINDOWS_MIN {
+                kept = alike;
+            }
+            before - kept.clock_s.len()
+        });
+        Ok(Self {
+            expected,
+            recording: kept,
+            windows_beyond,
+            windows_in_holes,
+            windows_too_rough,
+            windows_of_spikes,
+            windows_frozen,
+        })
     }
 }
 

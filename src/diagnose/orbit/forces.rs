@@ -118,7 +118,7 @@ impl Term {
 
     /// Unit of the coefficients.
     pub fn unit(self) -> &'static str {
-        if self.is_known_size() { "1" } else { "m/s^2" }
+        if self.is_known_size() || self == Self::Drag { "1" } else { "m/s^2" }
     }
 
     /// Whether physics fixes the coefficient beforehand: then it must come out as one.

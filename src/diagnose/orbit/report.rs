@@ -19,6 +19,9 @@ use crate::diagnose::measured::{Answer, Plates, log_score};
 /// Posterior from which on a term that all arcs together show is an effect of one of them.
 const SHOWN: f64 = 0.5;
 
+/// Times the stated accuracy from which on what remains of an arc is told.
+const LOUD: f64 = 2.0;
+
 /// Every arc's estimates of every accepted term.
 pub type Table = Vec<(Term, f64, Vec<Vec<Estimate>>)>;
 
@@ -67,7 +70,7 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
         separating_observation: None,
         cannot_tell_apart: Vec::new(),
         steps: steps(problem, search),
-        notes: notes(problem, &arcs),
+        notes: notes(problem, &arcs, search),
         effects: in_order(effects),
         arcs,
     }
@@ -429,7 +432,7 @@ fn finer(Finer { tide, relativity }: Finer) -> &'static str {
     }
 }
 
-fn notes(problem: &Problem, arcs: &[ArcAnswer]) -> Vec<String> {
+fn notes(problem: &Problem, arcs: &[ArcAnswer], search: &Search) -> Vec<String> {
     let mut notes = vec![
         "The initial state of every arc, and the coefficients of radiation terms that the simulation includes, are estimated with it."
             .to_owned(),
@@ -446,6 +449,20 @@ fn notes(problem: &Problem, arcs: &[ArcAnswer]) -> Vec<String> {
         arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).map(|arc| arc.id.as_str()).collect();
     if !odd.is_empty() {
         notes.push(format!("Unexplained, and given no cause: {}.", odd.join(", ")));
+    }
+    let stated_m = 3f64.sqrt() * problem.sigma_m;
+    let above = |arc: &&ArcAnswer| arc.verdict != Verdict::Unexplained && arc.rms_after > LOUD * stated_m;
+    let loud: Vec<String> = arcs
+        .iter()
+        .filter(above)
+        .map(|arc| format!("{} ({:.3} m, {:.1} times)", arc.id, arc.rms_after, arc.rms_after / stated_m))
+        .collect();
+    if !loud.is_empty() && search.manoeuvres.is_empty() {
+        notes.push(format!(
+            "More remains than the stated accuracy, {stated_m:.3} m in three dimensions, in {}: no more than the pushes that satellites \
+             have and no list does, so that nothing is claimed of it. A velocity step too small to be told from these may be there.",
+            loud.join(", ")
+        ));
     }
     notes
 }

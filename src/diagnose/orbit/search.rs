@@ -316,6 +316,9 @@ pub(super) fn independent(residual: &DVector<f64>, unknowns: usize) -> f64 {
     n.max(unknowns as f64 + 6.0)
 }
 
+/// Most drag that is believed, in that of a satellite of 0.01 m^2/kg: a balloon of a square metre a kilogram has it.
+const DRAG_MOST: f64 = 100.0;
+
 /// Evidence for a candidate in one arc. A term of known size is tried at that size, and pays for no parameter.
 pub fn evidence(arc: &Arc, fit: &ArcFit, term: Term) -> f64 {
     let projected = rows_of(arc, fit, |_| true, term);
@@ -324,8 +327,8 @@ pub fn evidence(arc: &Arc, fit: &ArcFit, term: Term) -> f64 {
         (&projected.residual - projected.columns.column_sum(), 0.0)
     } else {
         let Some(step) = super::arc::solve(&projected.columns, &projected.residual) else { return 0.0 };
-        // Air never pushes.
-        if term == Term::Drag && step[0] <= 0.0 {
+        // Air never pushes, and no satellite is so light.
+        if term == Term::Drag && !(0.0..DRAG_MOST).contains(&step[0]) {
             return 0.0;
         }
         (&projected.residual - &projected.columns * step, projected.columns.ncols() as f64)

@@ -338,6 +338,7 @@ fn to_come(scene: &Scene, action: Action, hours: f64) -> Option<(Case, Surroundi
             windows_in_holes: 0,
             windows_too_rough: 0,
             windows_of_spikes: 0,
+            windows_frozen: 0,
         },
         surroundings,
     ))

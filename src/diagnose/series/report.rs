@@ -3,7 +3,7 @@
 
 use super::follow::Follows;
 use super::read::{Axis, CovariateSeries, Series};
-use super::search::{AxisFound, held_out, missed, regress};
+use super::search::{AxisFound, SCORE_MIN, held_out, missed, regress};
 use crate::diagnose::answer::{Covariate, Hypothesis, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level, Limit, in_order, parameter, posterior,
@@ -11,6 +11,9 @@ use crate::diagnose::measured::answer::{
 use crate::diagnose::measured::log_score::{gain, rises};
 use crate::diagnose::measured::spread::median;
 use crate::diagnose::measured::{Answer, MeasuredCase};
+
+/// Evidence of an effect that is not claimed from which on it is told: odds of five hundred.
+const REFUSED_TOLD: f64 = 12.4;
 
 /// What stays is worth saying when it is this many times the scatter from one block to the next.
 const LEFT_FACTOR: f64 = 3.0;
@@ -147,6 +150,11 @@ impl Row<'_> {
             Some(hypothesis) => {
                 Some(format!("it follows {} better than any effect of the catalogue.", hypothesis.formula))
             }
+            None if effects.is_empty() && self.found.refused > REFUSED_TOLD => Some(format!(
+                "the strongest effect tried has an evidence of {:.1}: {SCORE_MIN} and a prediction of blocks left out are asked for, and \
+                 nothing is claimed.",
+                self.found.refused
+            )),
             None => note,
         };
         let verdict = match (effects.is_empty(), &self.found.form) {

@@ -13,7 +13,7 @@ use crate::math::rms::rms;
 
 /// Evidence needed to claim an effect, over red noise. A second gate follows: it must predict blocks that the fit has not
 /// seen. Of 1,000 series of red noise of any memory none passes both (`series::tests`); rarer false alarms are not shown.
-const SCORE_MIN: f64 = 18.0;
+pub(super) const SCORE_MIN: f64 = 18.0;
 /// A late response must beat the immediate one by this much: its time constant was looked for.
 const LATE_MARGIN: f64 = 18.0;
 /// Time constants tried for a late response, as parts of the span, beside none at all.

@@ -6,6 +6,7 @@ mod credible;
 mod faults;
 mod fit;
 mod imitators;
+mod inputs;
 mod judge;
 mod limits;
 mod named;
@@ -17,6 +18,7 @@ mod unnamed;
 use self::claims::{of_claims, of_unknown_claims, of_unknown_keys};
 use self::credible::credible;
 use self::fit::fit;
+use self::inputs::of_inputs;
 use self::judge::{Judged, judge};
 use self::limits::upper_limits;
 use self::named::name;
@@ -26,14 +28,12 @@ use self::stands::tried;
 use self::unnamed::{hypothesis, near_fail, of_failure, of_remains};
 use super::answer::{Diagnosis, LEAST_PROBABILITY, Located, Source, Verdict};
 use super::axes;
-use super::bursts::OUT;
-use super::case::{Event, KINDS_TRIED, SPIKE};
 use super::catalogue::Effect;
 use super::design::Frame;
 use super::instants::recurring;
 use super::locate;
 use super::model::{self, MemberFit};
-use super::noise::{AxisNoise, Contradicted, Resonance};
+use super::noise::{AxisNoise, Resonance};
 use super::remains::{self, Remains};
 use super::scene::{Axes, Scene};
 use super::search::{Entry, Family, Member, Set, Weighed};
@@ -60,9 +60,6 @@ const TOLD: f64 = 3.0;
 
 /// Log evidence lost to noise that is not white, from which on it is told.
 const TOLD_OF_COLOUR: f64 = 1.0;
-
-/// A log all of whose entries are farther from the recording may be of another clock, s.
-const LOG_AWAY_S: f64 = 2.0 * 86_400.0;
 
 /// What proof there is, and what is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -125,7 +122,7 @@ fn of_the_mismatch(
     solution: &Solution,
     proof: Proof,
 ) -> (Diagnosis, Axes, Vec<(String, f64)>) {
-    let mut notes = of_windows(scene);
+    let mut notes = of_inputs(scene);
     notes.extend(of_unknown_keys(scene));
     notes.extend(of_unknown_claims(scene));
     notes.extend(of_proportion(scene));
@@ -240,67 +237,6 @@ fn ladder(library: &Library, solution: &Solution) -> Vec<(String, f64)> {
     ladder.push(("nothing".into(), 0.0));
     ladder.sort_by(|a, b| b.1.total_cmp(&a.1));
     ladder
-}
-
-/// What must be known of the windows.
-fn of_windows(scene: &Scene) -> Vec<String> {
-    let rough = scene.case.windows_too_rough;
-    let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
-    let in_holes = scene.case.windows_in_holes;
-    let mut notes = Vec::new();
-    let beyond = scene.case.windows_beyond;
-    if beyond > 0 {
-        notes.push(format!(
-            "{beyond} windows of the span are not compared: they are before or after what simulation and ancillary data have"
-        ));
-    }
-    if in_holes > 0 {
-        notes.push(format!("{in_holes} windows are left out: simulation or ancillary data have a hole there"));
-    }
-    if rough > 0 {
-        notes.push(format!("{rough} windows are left out: the simulation changes too fast there for its own grid"));
-    }
-    let of_spikes = scene.case.windows_of_spikes;
-    if of_spikes > 0 {
-        notes.push(format!(
-            "{of_spikes} windows are left out: they stand alone, more than {SPIKE} standard deviations from those before and after"
-        ));
-    }
-    let kinds = scene.case.kinds().len();
-    if kinds > KINDS_TRIED {
-        notes.push(format!(
-            "the log has {kinds} kinds of entries: formulas are made of the {KINDS_TRIED} with most entries alone"
-        ));
-    }
-    let [start_s, end_s] = scene.span_s();
-    let events = &scene.case.events;
-    let far = |e: &Event| e.clock_s > end_s + LOG_AWAY_S || e.clock_s + e.duration_s < start_s - LOG_AWAY_S;
-    if !events.is_empty() && events.iter().all(far) {
-        notes.push(format!(
-            "none of the {} entries of the log is within {} days of the recording: it may be of another clock",
-            events.len(),
-            LOG_AWAY_S / 86_400.0
-        ));
-    }
-    for (axis, contradicted) in ["x", "y", "z"].iter().zip(scene.contradicted) {
-        match contradicted {
-            Some(Contradicted::Crew { said, shown }) => notes.push(format!(
-                "the noise of axis {axis} is taken as {shown:.2} times as loud with the crew awake as asleep, which its windows show: \
-                 their deviations say {said:.2}"
-            )),
-            Some(Contradicted::Stretches { quietest, loudest }) => notes.push(format!(
-                "the noise of axis {axis} is louder in some half hours than the crew's sleep and the deviations say, as its windows show: \
-                 {quietest:.2} to {loudest:.2} times the middle one, and is taken so"
-            )),
-            None => {}
-        }
-    }
-    if bursts > 0 {
-        notes.push(format!(
-            "{bursts} values out of the ordinary weigh less: more than {OUT} standard deviations of the noise"
-        ));
-    }
-    notes
 }
 
 /// Says which axes are taken to have noise of the second order.

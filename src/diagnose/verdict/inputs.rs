@@ -1,0 +1,138 @@
+//! What must be known of what was given: windows left out, a log of another clock, a simulation of another size. Not here: what was
+//! found in it.
+
+use crate::diagnose::bursts::OUT;
+use crate::diagnose::case::{Event, KINDS_TRIED, SPIKE};
+use crate::diagnose::noise::Contradicted;
+use crate::diagnose::scene::Scene;
+use crate::math::rms::rms_about_mean;
+use crate::physics::Vec3;
+use crate::units::NANO_G_M_S2;
+
+/// A log all of whose entries are farther from the recording may be of another clock, s.
+const LOG_AWAY_S: f64 = 2.0 * 86_400.0;
+/// Kinds of entries that effects of the catalogue go by.
+const KINDS: [&str; 4] = ["water_dump", "evaporator", "thruster", "crew_sleep"];
+/// Times by which a simulation must be smaller or larger than this project's own gravity gradient, rotation and drag for that to be
+/// told, and how large the larger then is, ng.
+const OTHER_SIZE: f64 = 100.0;
+const OWN_SIZE_NG: f64 = 20.0;
+
+/// All of it, in sentences.
+pub fn of_inputs(scene: &Scene) -> Vec<String> {
+    let mut notes = of_windows(scene);
+    notes.extend(of_the_simulation(scene));
+    notes.extend(of_the_log(scene));
+    notes.extend(of_the_noise(scene));
+    notes
+}
+
+/// Windows that are not compared.
+fn of_windows(scene: &Scene) -> Vec<String> {
+    let case = scene.case;
+    let spikes = format!(
+        "windows are left out: they stand alone, more than {SPIKE} standard deviations from those before and after"
+    );
+    let told = [
+        (
+            case.windows_beyond,
+            "windows of the span are not compared: they are before or after what simulation and ancillary data have",
+        ),
+        (case.windows_in_holes, "windows are left out: simulation or ancillary data have a hole there"),
+        (case.windows_too_rough, "windows are left out: the simulation changes too fast there for its own grid"),
+        (case.windows_frozen, "windows are left out: an axis repeats the same value there, or all three do"),
+        (case.windows_of_spikes, &spikes),
+    ];
+    told.iter().filter(|(count, _)| *count > 0).map(|(count, why)| format!("{count} {why}")).collect()
+}
+
+/// A simulation of another size than anything that its vehicle feels: of another unit, or without it all.
+fn of_the_simulation(scene: &Scene) -> Option<String> {
+    let offset_m = scene.vehicle.sensor_offset_m;
+    let felt = |i: usize| scene.tensor_s2(i) * offset_m / NANO_G_M_S2 + scene.drag_ng[i];
+    let own: Vec<Vec3> = (0..scene.grid_s.len()).map(felt).collect();
+    let of_axes = |axis: &dyn Fn(usize) -> f64| (0..3).map(|k| axis(k).powi(2)).sum::<f64>().sqrt();
+    let own_ng = of_axes(&|k| rms_about_mean(&own.iter().map(|a| a[k]).collect::<Vec<f64>>()));
+    let simulated_ng = of_axes(&|k| rms_about_mean(&scene.case.simulation.a_ng[k]));
+    let apart = simulated_ng * OTHER_SIZE < own_ng || simulated_ng > own_ng * OTHER_SIZE;
+    (apart && own_ng.max(simulated_ng) > OWN_SIZE_NG).then(|| {
+        format!(
+            "the simulation varies by {simulated_ng:.3} ng rms, gravity gradient, rotation and drag of this vehicle by {own_ng:.1} ng: it \
+             may be of another unit, or lack them"
+        )
+    })
+}
+
+/// A log of more kinds than are tried, of another spelling, or of another clock.
+fn of_the_log(scene: &Scene) -> Vec<String> {
+    let kinds = scene.case.kinds();
+    let mut notes: Vec<String> = kinds.iter().filter_map(|kind| misspelt(kind)).collect();
+    if kinds.len() > KINDS_TRIED {
+        notes.push(format!(
+            "the log has {} kinds of entries: formulas are made of the {KINDS_TRIED} with most entries alone",
+            kinds.len()
+        ));
+    }
+    let [start_s, end_s] = scene.span_s();
+    let events = &scene.case.events;
+    let far = |e: &Event| e.clock_s > end_s + LOG_AWAY_S || e.clock_s + e.duration_s < start_s - LOG_AWAY_S;
+    if !events.is_empty() && events.iter().all(far) {
+        notes.push(format!(
+            "none of the {} entries of the log is within {} days of the recording: it may be of another clock",
+            events.len(),
+            LOG_AWAY_S / 86_400.0
+        ));
+    }
+    let moments = events.iter().filter(|e| e.duration_s == 0.0 && KINDS.contains(&e.kind.as_str())).count();
+    if moments > 0 {
+        notes.push(format!(
+            "{moments} entries of the log last no time at all: whatever goes on for as long as they do has no windows"
+        ));
+    }
+    notes
+}
+
+/// A kind that is one of the catalogue's but for how it is written.
+fn misspelt(kind: &str) -> Option<String> {
+    let plain = kind.trim().to_lowercase().replace([' ', '-'], "_");
+    let listed = KINDS.iter().find(|listed| **listed == plain && **listed != kind)?;
+    Some(format!(
+        "the log's \"{kind}\" is no kind that the catalogue goes by, and a kind of its own here: is it {listed}?"
+    ))
+}
+
+/// Deviations and a log that the windows contradict, and values out of the ordinary.
+fn of_the_noise(scene: &Scene) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (axis, contradicted) in ["x", "y", "z"].iter().zip(scene.contradicted) {
+        match contradicted {
+            Some(Contradicted::Crew { said, shown }) => notes.push(format!(
+                "the noise of axis {axis} is taken as {shown:.2} times as loud with the crew awake as asleep, which its windows show: \
+                 their deviations say {said:.2}"
+            )),
+            Some(Contradicted::Stretches { quietest, loudest }) => notes.push(format!(
+                "the noise of axis {axis} is louder in some half hours than the crew's sleep and the deviations say, as its windows show: \
+                 {quietest:.2} to {loudest:.2} times the middle one, and is taken so"
+            )),
+            None => {}
+        }
+    }
+    let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
+    if bursts > 0 {
+        notes.push(format!(
+            "{bursts} values out of the ordinary weigh less: more than {OUT} standard deviations of the noise"
+        ));
+    }
+    notes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kind_written_otherwise_is_asked_about() {
+        assert!(misspelt("Water Dump").unwrap().ends_with("is it water_dump?"));
+        assert!(misspelt("water_dump").is_none() && misspelt("treadmill").is_none());
+    }
+}
