@@ -135,6 +135,10 @@ fn holes_repeated_times_and_rows_out_of_order_change_nothing() {
     let (value, sigma) = slope(&answer);
     assert!((value - SLOPE).abs() < 3.0 * sigma, "{value} +- {sigma}");
     assert_eq!(answer["arcs"][0]["masked"], 4, "an empty line is no row");
+    // The newest first.
+    let mut lines: Vec<String> = csv(&rows(4_000, 10.0)).lines().map(str::to_owned).collect();
+    lines[1..].reverse();
+    follows(&series_case(USUAL), &lines.join("\n"), SLOPE);
 }
 
 #[test]
@@ -146,6 +150,15 @@ fn a_series_without_a_covariate_or_without_a_change_lacks_nothing() {
     for (case, rows) in [(bare, &noise), (USUAL, &noise), (USUAL, &still), (USUAL, &flat)] {
         let (answer, ids) = answered(&series_case(case), &[("s.csv", &csv(rows))]);
         assert!(ids.is_empty() && answer["verdict"] == "consistent", "{answer:#}");
+        let limits = answer["upper_limits"].as_array().expect("limits");
+        let of = |id: &str| limits.iter().find(|limit| limit["id"] == id).and_then(|limit| limit["limit"].as_f64());
+        let moves = |column: usize| rows.iter().any(|row| row[column] != rows[0][column]);
+        assert_eq!(of("temperature_bias").is_some(), case == USUAL && moves(1), "{limits:?}");
+        // White noise of 0.2 and 2,000 rows: less than that would be seen.
+        let largest = if moves(2) { 0.2 } else { 1e-9 };
+        for id in ["bias_step", "bias_drift"] {
+            assert!(of(id).is_some_and(|limit| limit < largest), "{id}: {limits:?}");
+        }
     }
 }
 

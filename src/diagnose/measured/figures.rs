@@ -29,7 +29,7 @@ pub fn all(plates: &Plates) -> Vec<(&'static str, &'static str, Drawn)> {
             (
                 "arcs.svg",
                 "3-D residual of each satellite as the simulation stands (grey) and with everything named (blue; red where it \
-                 stays unexplained).",
+                 stays unexplained, above the dashed line).",
                 arcs(plate),
             ),
         ],
@@ -175,13 +175,19 @@ fn ladder(plate: &OrbitPlate) -> Drawn {
     })
 }
 
+/// Names of satellites that fit below a panel side by side.
+const NAMES_IN_A_ROW: usize = 20;
+
 fn arcs(plate: &OrbitPlate) -> Drawn {
     let (Some(first), Some(last)) = (plate.rms_m.first(), plate.rms_m.last()) else { return Ok(String::new()) };
     on_canvas(300, |canvas| {
         let (low, high) = decades(first.iter().chain(last).copied().chain([plate.rms_max_m]));
         let n = plate.arcs.len();
         let every = n.div_ceil(34).max(1);
-        let along = Along { span: -1.0..n as f64, labels: 0, label: &|_| String::new(), name: "", height: 28 };
+        // Many names stand in two rows.
+        let rows = if n > NAMES_IN_A_ROW { 2 } else { 1 };
+        let height = 14 + 13 * rows as u32;
+        let along = Along { span: -1.0..n as f64, labels: 0, label: &|_| String::new(), name: "", height };
         let mut chart = log_panel(canvas, along, (low, high), "3-D rms, m", 70)?;
         for k in 0..n {
             let x = k as f64;
@@ -192,7 +198,8 @@ fn arcs(plate: &OrbitPlate) -> Drawn {
             chart.draw_series([Circle::new((x, is), 4, colour.filled())]).map_err(said)?;
             if k % every == 0 {
                 let (px, py) = chart.backend_coord(&(x, low));
-                canvas.draw(&Text::new(plate.arcs[k].clone(), (px - 11, py + 7), text(11))).map_err(said)?;
+                let place = (px - 11, py + 7 + 13 * (k / every % rows) as i32);
+                canvas.draw(&Text::new(plate.arcs[k].clone(), place, text(11))).map_err(said)?;
             }
         }
         let limit = plate.rms_max_m.log10();

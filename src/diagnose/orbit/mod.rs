@@ -119,6 +119,9 @@ pub fn problem(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<
     }
     let environment = Environment::new(recording.origin, recording.span_s(), &eop, field).map_err(of_eop)?;
     let fit_s = case.number("recording.fit_hours")?.map_or(f64::INFINITY, |h| h * 3600.0);
+    if fit_s <= 0.0 {
+        return Err(case.wrong("recording.fit_hours", "a number above zero"));
+    }
     let sigma_m = case.number("recording.position_sigma_m")?.unwrap_or(POSITION_SIGMA_M);
     if sigma_m <= 0.0 {
         return Err(case.wrong("recording.position_sigma_m", "a number above zero"));

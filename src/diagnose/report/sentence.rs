@@ -38,21 +38,29 @@ fn explained(d: &Diagnosis) -> String {
             format!("{}{size}", lower_first(&e.name))
         })
         .collect();
-    // Where the blocks held out have no part in the effect there is no fall to tell of.
-    let fell = |fit: &&Fit| norm(fit.held_out.after_rms_ng) < 0.995 * norm(fit.held_out.before_rms_ng);
-    let gain = d.fit.as_ref().filter(fell).map_or(String::new(), |fit| {
-        format!(
-            " With it, the misfit on data the fit has not seen falls from {} to {} ng, against noise of {} ng.",
-            short(norm(fit.held_out.before_rms_ng)),
-            short(norm(fit.held_out.after_rms_ng)),
-            short(norm(fit.noise_floor_ng))
-        )
-    });
+    let unseen = d.fit.as_ref().map_or(String::new(), of_unseen);
     let why = match d.effects.as_slice() {
         [only] => format!(" {}", only.why.trim()),
         all => all.iter().map(|e| format!(" {}: {}", e.name, lower_first(e.why.trim()))).collect(),
     };
-    format!("What the simulation lacks or has wrong: {}.{why}{gain}", listed(&names, "and"))
+    format!("What the simulation lacks or has wrong: {}.{why}{unseen}", listed(&names, "and"))
+}
+
+/// How the misfit changes on data that the fit has not seen; where the blocks held out have no part in the effect there is nothing to tell.
+fn of_unseen(fit: &Fit) -> String {
+    let [before, after, floor] = [fit.held_out.before_rms_ng, fit.held_out.after_rms_ng, fit.noise_floor_ng].map(norm);
+    let figures = || format!("from {} to {} ng, against noise of {} ng", short(before), short(after), short(floor));
+    match after / before {
+        share if share < 0.995 => {
+            format!(" With it, the misfit on data the fit has not seen falls {}.", figures())
+        }
+        share if share > 1.01 => format!(
+            " The misfit on data the fit has not seen rises {}: a part of the record does not tell what the rest has, and the figures hold \
+             for all of it alone.",
+            figures()
+        ),
+        _ => String::new(),
+    }
 }
 
 fn ambiguous(d: &Diagnosis) -> String {
@@ -98,7 +106,7 @@ fn norm(v: [f64; 3]) -> f64 {
 pub fn lower_first(name: &str) -> String {
     let mut letters = name.chars();
     match (letters.next(), letters.as_str()) {
-        (Some(first), rest) if rest.starts_with(char::is_lowercase) => {
+        (Some(first), rest) if rest.starts_with(|next: char| next.is_lowercase() || next == ' ') => {
             first.to_lowercase().chain(rest.chars()).collect()
         }
         _ => name.to_owned(),

@@ -66,6 +66,20 @@ impl Follows {
         }
     }
 
+    /// Unit of its coefficient on an axis of another.
+    pub fn unit(&self, axis: &str, series: &Series) -> String {
+        match self {
+            Self::Temperature(k, _) | Self::Delayed(k, _) | Self::Field(k) => {
+                format!("{axis}/{}", series.covariates[*k].unit)
+            }
+            Self::Form(form, k, _) => format!("{axis}/{}", form.unit(&series.covariates[*k].unit)),
+            Self::Product(k, j) => format!("{axis}/({} {})", series.covariates[*k].unit, series.covariates[*j].unit),
+            Self::Drift(_) | Self::Step(_) => axis.to_owned(),
+            Self::Scale => "1".to_owned(),
+            Self::Offset(_) => "s".to_owned(),
+        }
+    }
+
     /// How many unknowns it is charged for: its coefficient, and what was looked for beside it.
     pub fn price(&self) -> f64 {
         match self {

@@ -245,7 +245,20 @@ fn rows(case: &MeasuredCase, file: &str, text: &str, wanted: &[&Column]) -> Resu
         let all = masked + t_s.len();
         return Err(bad(line, format!("{expected} ({masked} of {all} rows cannot be read)"), found));
     }
+    let (t_s, table) = in_order(t_s, table);
     Ok((t_s, table, masked))
+}
+
+/// Rows by their time, after that of the earliest: a file may have the newest first, or a few that came late.
+fn in_order(t_s: Vec<f64>, table: Vec<Vec<f64>>) -> (Vec<f64>, Vec<Vec<f64>>) {
+    if t_s.is_sorted() {
+        return (t_s, table);
+    }
+    let mut order: Vec<usize> = (0..t_s.len()).collect();
+    order.sort_by(|a, b| t_s[*a].total_cmp(&t_s[*b]));
+    let earliest = t_s[order[0]];
+    let sorted = |column: &Vec<f64>| order.iter().map(|i| column[*i]).collect::<Vec<f64>>();
+    (order.iter().map(|i| t_s[*i] - earliest).collect(), table.iter().map(sorted).collect())
 }
 
 fn seconds(text: &str, format: Option<&str>) -> Option<f64> {

@@ -2,8 +2,8 @@
 //! found (`search`).
 
 use super::follow::Follows;
-use super::read::{Axis, CovariateSeries, Series};
-use super::search::{AxisFound, SCORE_MIN, held_out, missed, regress};
+use super::read::{Axis, Series};
+use super::search::{AxisFound, SCORE_MIN, candidates, held_out, missed, regress};
 use crate::diagnose::answer::{Covariate, Hypothesis, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level, Limit, in_order, parameter, posterior,
@@ -50,7 +50,7 @@ pub fn answer(case: &MeasuredCase, series: &Series, found: &[AxisFound]) -> Answ
             .filter(|_| verdict == Verdict::Unexplained),
         unit: measured.first().map_or(String::new(), |row| row.axis.unit.clone()),
         fit: fit(&measured),
-        upper_limits: rows.iter().filter_map(Row::limit).collect(),
+        upper_limits: rows.iter().flat_map(Row::limits).collect(),
         separating_observation: None,
         cannot_tell_apart: Vec::new(),
         steps: Vec::new(),
@@ -180,20 +180,19 @@ impl Row<'_> {
     fn hypothesis(&self) -> Option<Hypothesis> {
         let (form, _, fit) = self.found.form.as_ref()?;
         let (value, sigma) = *fit.coefficients.last()?;
-        let (unit, words) = match form {
+        let words = match form {
             Follows::Form(form, k, lag_s) => {
                 let covariate = &self.series.covariates[*k];
-                (form.unit(&covariate.unit), form.words(&covariate.name, &covariate.values, *lag_s))
+                form.words(&covariate.name, &covariate.values, *lag_s)
             }
             Follows::Product(k, j) => {
-                let [one, other] = [k, j].map(|k| &self.series.covariates[*k]);
-                let about = |covariate: &CovariateSeries| format!("({0} - <{0}>)", covariate.name);
-                (format!("({} {})", one.unit, other.unit), format!("{} {}", about(one), about(other)))
+                let [one, other] = [k, j].map(|k| &self.series.covariates[*k].name);
+                format!("({one} - <{one}>) ({other} - <{other}>)")
             }
             _ => return None,
         };
         Some(Hypothesis {
-            formula: format!("({value:.3e} +- {sigma:.1e}) {}/{unit} x {words}", self.axis.unit),
+            formula: format!("({value:.3e} +- {sigma:.1e}) {} x {words}", form.unit(&self.axis.unit, self.series)),
             axis: self.axis.name.clone(),
             unit: self.axis.unit.clone(),
             location: format!(
@@ -207,17 +206,36 @@ impl Row<'_> {
         })
     }
 
-    /// How large a slope could hide, where none is claimed.
-    fn limit(&self) -> Option<Limit> {
-        let covariate = (0..self.series.covariates.len()).find(|k| self.series.covariates[*k].is_temperature())?;
-        if !self.found.effects.is_empty() {
-            return None;
+    /// How large what the catalogue has could be, where nothing is claimed: of each effect the loosest of what was tried, a step at a
+    /// quarter, half and three quarters of the record, a decay that is over within it.
+    fn limits(&self) -> Vec<Limit> {
+        if !self.found.effects.is_empty() || self.found.form.is_some() {
+            return Vec::new();
         }
-        let mut model = self.found.included.clone();
-        model.push(Follows::Temperature(covariate, 0.0));
-        let (value, sigma) = regress(self.series, self.axis, &model).coefficients[self.found.included.len()];
-        let unit = format!("{}/{} on {}", self.axis.unit, self.series.covariates[covariate].unit, self.axis.column);
-        Some(Limit { id: "temperature_bias".to_owned(), limit: value.abs() + 2.0 * sigma, unit })
+        let t_s = &self.series.t_s;
+        let within = |part: f64| t_s[0] + part * (t_s[t_s.len() - 1] - t_s[0]);
+        let steps = [0.25, 0.5, 0.75].map(|part| Follows::Step(within(part)));
+        let mut limits: Vec<(String, Limit)> = Vec::new();
+        for follows in candidates(self.series, self.axis).into_iter().chain(steps) {
+            let model = [&self.found.included[..], &[follows]].concat();
+            let beyond = matches!(follows, Follows::Drift(tau_s) if tau_s > within(1.0) - t_s[0]);
+            if beyond || self.found.included.iter().any(|has| has.excludes(&follows)) {
+                continue;
+            }
+            let (value, sigma) = regress(self.series, self.axis, &model).coefficients[self.found.included.len()];
+            let limit = value.abs() + 2.0 * sigma;
+            let unit = format!("{} on {}", follows.unit(&self.axis.unit, self.series), self.axis.column);
+            // A coefficient that a record does not determine has no limit to tell.
+            if !limit.is_finite() || sigma >= f64::MAX {
+                continue;
+            }
+            let what = format!("{} {}", follows.id(), follows.of_what(self.series));
+            match limits.iter_mut().find(|(other, _)| *other == what) {
+                Some((_, loosest)) => loosest.limit = loosest.limit.max(limit),
+                None => limits.push((what, Limit { id: follows.id().to_owned(), limit, unit })),
+            }
+        }
+        limits.into_iter().map(|(_, limit)| limit).collect()
     }
 }
 

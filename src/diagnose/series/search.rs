@@ -237,7 +237,8 @@ fn forms(series: &Series) -> Vec<Follows> {
     series.covariates.iter().enumerate().flat_map(of_one).chain(products).collect()
 }
 
-fn candidates(series: &Series, axis: &Axis) -> Vec<Follows> {
+/// What the catalogue has for a series, but steps and delays.
+pub fn candidates(series: &Series, axis: &Axis) -> Vec<Follows> {
     let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
     let mut all = Vec::new();
     for (k, _) in series.covariates.iter().enumerate().filter(|(_, c)| c.is_temperature()) {

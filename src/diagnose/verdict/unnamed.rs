@@ -62,7 +62,7 @@ pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed]) -> Hypoth
         formula: formula.join(" + "),
         axis: axis.join("; "),
         unit: "ng".into(),
-        location: format!("It lives in {}. {READ}{failing}", location.join(" and ")),
+        location: format!("Where it lives: {}. {READ}{failing}", location.join(", and ")),
     }
 }
 
