@@ -1,7 +1,7 @@
 //! What a series was found to follow, in words and figures: one entry an axis, and all axes together. Not here: how it was
 //! found (`search`).
 
-use super::follow::Follows;
+use super::follow::{Follows, equation};
 use super::read::{Axis, Series};
 use super::search::{AxisFound, SCORE_MIN, candidates, held_out, missed, regress};
 use crate::diagnose::answer::{Covariate, Hypothesis, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
@@ -11,6 +11,7 @@ use crate::diagnose::measured::answer::{
 use crate::diagnose::measured::log_score::{gain, rises};
 use crate::diagnose::measured::spread::median;
 use crate::diagnose::measured::{Answer, MeasuredCase};
+use crate::math::rms::{rms, rms_about_mean};
 
 /// Evidence of an effect that is not claimed from which on it is told: odds of five hundred.
 const REFUSED_TOLD: f64 = 12.4;
@@ -209,7 +210,8 @@ impl Row<'_> {
     /// How large what the catalogue has could be, where nothing is claimed: of each effect the loosest of what was tried, a step at a
     /// quarter, half and three quarters of the record, a decay that is over within it.
     fn limits(&self) -> Vec<Limit> {
-        if !self.found.effects.is_empty() || self.found.form.is_some() {
+        let still = self.found.last().rms() <= self.axis.rounding();
+        if still || !self.found.effects.is_empty() || self.found.form.is_some() {
             return Vec::new();
         }
         let t_s = &self.series.t_s;
@@ -219,16 +221,18 @@ impl Row<'_> {
         for follows in candidates(self.series, self.axis).into_iter().chain(steps) {
             let model = [&self.found.included[..], &[follows]].concat();
             let beyond = matches!(follows, Follows::Drift(tau_s) if tau_s > within(1.0) - t_s[0]);
-            if beyond || self.found.included.iter().any(|has| has.excludes(&follows)) {
+            // Nor has a coefficient of what does not change a limit.
+            let column = equation(self.series, self.axis, &[follows]).columns.swap_remove(0);
+            let constant = rms_about_mean(&column) <= 1e-9 * rms(&column);
+            if beyond || constant || self.found.included.iter().any(|has| has.excludes(&follows)) {
                 continue;
             }
             let (value, sigma) = regress(self.series, self.axis, &model).coefficients[self.found.included.len()];
             let limit = value.abs() + 2.0 * sigma;
-            let unit = format!("{} on {}", follows.unit(&self.axis.unit, self.series), self.axis.column);
-            // A coefficient that a record does not determine has no limit to tell.
-            if !limit.is_finite() || sigma >= f64::MAX {
+            if !limit.is_finite() {
                 continue;
             }
+            let unit = format!("{} on {}", follows.unit(&self.axis.unit, self.series), self.axis.column);
             let what = format!("{} {}", follows.id(), follows.of_what(self.series));
             match limits.iter_mut().find(|(other, _)| *other == what) {
                 Some((_, loosest)) => loosest.limit = loosest.limit.max(limit),
