@@ -19,6 +19,9 @@ use crate::diagnose::measured::{Answer, Plates, log_score};
 /// Posterior from which on a term that all arcs together show is an effect of one of them.
 const SHOWN: f64 = 0.5;
 
+/// Times by which a prediction beyond the fit may be worse with a term that is named.
+const WORSE_MAX: f64 = 1.5;
+
 /// Times the stated accuracy from which on what remains of an arc is told.
 const LOUD: f64 = 2.0;
 
@@ -29,10 +32,14 @@ pub type Table = Vec<(Term, f64, Vec<Vec<Estimate>>)>;
 pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
     let (first, end) = (&search.levels[0], &search.end());
     let table = table(problem, end);
-    let arcs: Vec<ArcAnswer> = (0..problem.arcs.len()).map(|i| arc_answer(problem, search, end, &table, i)).collect();
+    let mut arcs: Vec<ArcAnswer> =
+        (0..problem.arcs.len()).map(|i| arc_answer(problem, search, end, &table, i)).collect();
     let unexplained = arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).count();
     let named: Vec<bool> =
         table.iter().enumerate().map(|(step, (term, ..))| explains(problem, search, &arcs, step, *term)).collect();
+    for ((term, ..), _) in table.iter().zip(&named).filter(|(_, named)| !**named) {
+        arcs.iter_mut().for_each(|arc| unclaim(arc, term.id()));
+    }
     let nothing = !named.contains(&true) && search.manoeuvres.is_empty() && search.own.is_empty();
     // Where nothing is named, a single arc that holds something is no silence.
     let odd = if nothing { unexplained > 0 } else { 2 * unexplained > arcs.len() };
@@ -76,11 +83,28 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
     }
 }
 
-/// Whether a term explains any arc that asks for it: a push of unknown size that is asked for by arcs alone that stay unexplained with it
-/// is no name for what is in them.
+/// Whether a term explains any arc that asks for it: a push of unknown size that is asked for by arcs alone that stay unexplained with it,
+/// or are worse predicted with it, is no name for what is in them.
 fn explains(problem: &Problem, search: &Search, arcs: &[ArcAnswer], step: usize, term: Term) -> bool {
-    let asks = |i: usize| evidence(&problem.arcs[i], &search.levels[step].fits[i], term) > 0.0;
-    term.is_known_size() || (0..arcs.len()).any(|i| arcs[i].verdict != Verdict::Unexplained && asks(i))
+    let [before, after] = [step, step + 1].map(|level| &search.levels[level].fits);
+    let asks = |i: usize| evidence(&problem.arcs[i], &before[i], term) > 0.0;
+    let foretold = |i: usize| match [before, after].map(|fits| predicted_m(&problem.arcs[i], &fits[i])) {
+        [Some(before_m), Some(after_m)] => after_m <= WORSE_MAX * before_m,
+        _ => true,
+    };
+    let explained = |i: usize| arcs[i].verdict != Verdict::Unexplained && asks(i) && foretold(i);
+    term.is_known_size() || (0..arcs.len()).any(explained)
+}
+
+/// A term that is named for no arc stands beside what is.
+fn unclaim(arc: &mut ArcAnswer, id: &str) {
+    let (unnamed, shown): (Vec<Effect>, Vec<Effect>) =
+        std::mem::take(&mut arc.effects).into_iter().partition(|effect| effect.id == id);
+    arc.effects = shown;
+    arc.fitted_beside.extend(unnamed);
+    if arc.effects.is_empty() && arc.verdict == Verdict::Explained {
+        arc.verdict = Verdict::Consistent;
+    }
 }
 
 /// Numbers for the figures.
