@@ -48,6 +48,34 @@ fn a_prior_about_a_mean_is_one_about_nothing_of_what_the_mean_leaves() {
     assert!(0.85 < size && size < 1.0, "between what the data say and what the prior does: {size}");
 }
 
+/// Choices side by side are each as if alone, whether they share a column or have none.
+#[test]
+fn columns_beside_several_choices_are_those_beside_each() {
+    let wave = |rate: f64| -> Vec<f64> { (0..WINDOWS).map(|i| 30.0 * (rate * f64::from(i)).sin()).collect() };
+    let residual: Axes = [wave(0.05), wave(0.06), wave(0.07)];
+    let frame = framed(8.0, schedule(), &residual);
+    let [a, b, c] = [0.051, 0.055, 0.062].map(|rate| full_column(&frame, &wave(rate), 1.0));
+    let louder = a.times(3.0);
+    let whole = full_column(&frame, &wave(0.3), 1.0);
+    let tried = [full_column(&frame, &wave(0.058), 1.0), full_column(&frame, &wave(0.066), 2.0)];
+    let alone = Normal::of(&tried).before(&tried, &frame.data);
+    let chosen = || {
+        vec![
+            Chosen::new(&frame, vec![&a, &b], &[]),
+            Chosen::new(&frame, vec![&c, &a], &[&whole]),
+            Chosen::new(&frame, Vec::new(), &[]),
+            Chosen::new(&frame, vec![&louder], &[]),
+        ]
+    };
+    let which = [0, 1, 2, 3, 1];
+    let together = Choices::new(chosen()).beside(&which, &tried, &alone);
+    for (choice, normal) in which.iter().zip(&together) {
+        let own = chosen()[*choice].beside(&tried, &alone);
+        assert_eq!((normal.gain(1.0), normal.gain(8.0)), (own.gain(1.0), own.gain(8.0)), "{choice}");
+    }
+    assert_ne!(together[0].gain(1.0), together[3].gain(1.0));
+}
+
 /// A constant is nuisance however large it is: also to what subtracts whole series, as a clock offset does.
 #[test]
 fn a_constant_a_thousand_times_the_noise_changes_no_evidence() {
