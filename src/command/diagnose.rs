@@ -12,6 +12,7 @@ use oare_ground::diagnose::catalogue;
 use oare_ground::diagnose::error::CaseError;
 use oare_ground::diagnose::measured::{self, MeasuredCase};
 use oare_ground::diagnose::report;
+use oare_ground::paper::page::with_error;
 
 use super::output::{write, write_report};
 
@@ -99,20 +100,24 @@ fn measured(args: &Args) -> anyhow::Result<ExitCode> {
 
 /// Why the answer cannot go where it is wanted: over a file of the case, into a folder, or a report among the files of the case.
 fn misplaced(args: &Args) -> Option<String> {
-    let inside = |path: &Path| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        folder.canonicalize().ok() == args.case.canonicalize().ok()
-    };
+    let case = args.case.canonicalize().ok()?;
     if let Some(out) = &args.out {
         if out.is_dir() {
             return Some(format!("--out {}: expected a file, found a folder", out.display()));
         }
-        if out.is_file() && inside(out) && out.file_name().is_none_or(|name| name != "diagnosis.json") {
+        if out.canonicalize().is_ok_and(|out| out.starts_with(&case)) && !is_answer(out) {
             return Some(format!("--out {}: that is a file of the case, and is not written over", out.display()));
         }
     }
-    let report = args.report.as_ref().filter(|report| inside(&report.join("index.html")))?;
+    let report = args.report.as_ref().filter(|report| report.canonicalize().is_ok_and(|report| report == case))?;
     Some(format!("--report {}: that is the case itself, and is not written to", report.display()))
+}
+
+/// Whether a file is an earlier answer.
+fn is_answer(path: &Path) -> bool {
+    let json =
+        std::fs::read_to_string(path).ok().and_then(|text| serde_json::from_str::<serde_json::Value>(&text).ok());
+    json.is_some_and(|json| json["schema"].as_str().is_some_and(|schema| schema.starts_with("oare.diagnosis/")))
 }
 
 /// Runs it.
@@ -183,12 +188,6 @@ fn probability(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A value and its standard error, to three figures of the error.
-fn to_its_error(value: f64, sigma: f64) -> [String; 2] {
-    let places = if sigma > 0.0 { (2.0 - sigma.log10().floor()).clamp(0.0, 9.0) as usize } else { 6 };
-    [value, sigma].map(|x| format!("{x:.places$}"))
-}
-
 fn print_table(diagnosis: &Diagnosis) {
     let verdict = diagnosis.verdict.word();
     let from = diagnosis.false_alarm_from.map_or(String::new(), |source| format!(", by the {}", source.words()));
@@ -199,8 +198,9 @@ fn print_table(diagnosis: &Diagnosis) {
             println!("      {:<18} {axis}", "axis");
         }
         for p in &effect.parameters {
-            let [value, sigma] = to_its_error(p.value, p.sigma);
-            println!("      {:<18} {value:>14} +- {sigma} {}", p.name, p.unit);
+            let (value, sigma) = with_error(p.value, p.sigma);
+            let error = if sigma.is_empty() { sigma } else { format!(" +- {sigma}") };
+            println!("      {:<18} {value:>14}{error} {}", p.name, p.unit);
         }
     }
     if let Some(h) = &diagnosis.hypothesis {

@@ -140,7 +140,11 @@ fn no_file_of_the_case_is_written_over() {
     refused("--out", folder.path(), "found a folder");
     refused("--report", folder.path(), "the case itself");
     assert_eq!(std::fs::read(&recording).unwrap(), before);
-    assert_eq!(run("--out", &folder.path().join("diagnosis.json")).0, Some(0));
+    // An earlier answer is, and nothing else that is JSON.
+    let (answer, other) = (folder.path().join("answer.json"), folder.path().join("other.json"));
+    std::fs::write(&other, "{}").unwrap();
+    refused("--out", &other, "a file of the case");
+    assert_eq!([run("--out", &answer).0, run("--out", &answer).0], [Some(0); 2]);
 }
 
 #[test]

@@ -3,10 +3,11 @@
 
 use super::{Recording, take};
 
-/// Windows in a row with the same value from which on an axis hangs, and the same of all three together.
-pub const HANGS: usize = 40;
+/// Windows in a row with the same value from which on an axis hangs, and the same of all three together: of independent windows three in
+/// ten of which repeat the one before, the most that is not coarse, a run begins with a chance of 0.3^39 and 0.3^33.
+const HANGS: usize = 40;
 const ALL_HANG: usize = 12;
-/// An axis that repeats itself more often than this is coarse, and says nothing so.
+/// An axis that repeats itself more often than this beside its long runs is in coarse steps, and hangs by no run.
 const COARSE: f64 = 0.3;
 
 /// The recording without windows in which an axis hangs.

@@ -366,6 +366,9 @@ pub fn in_sensor(scene: &Scene, at: impl Fn(&[f64]) -> Vec<f64>) -> Shape {
     Shape::Columns((0..3).map(column).collect())
 }
 
+/// Kinds of entries in the log that effects of the catalogue go by.
+pub const LOGGED_KINDS: [&str; 4] = [water_dump::KIND, evaporator_venting::KIND, "thruster", "crew_sleep"];
+
 /// The kind of entries in the log that an effect acts by, and by nothing else.
 pub fn logged_kind(id: &str) -> Option<&'static str> {
     match id {

@@ -4,6 +4,7 @@ use std::ops::{Add, Mul, Sub};
 
 use super::Collector;
 use crate::diagnose::case::HALF_WINDOW_S;
+use crate::diagnose::catalogue::LOGGED_KINDS;
 use crate::diagnose::instants::{manoeuvres, still_warm, terminators};
 use crate::diagnose::measure::{coverage, decay, union, weighted_coverage};
 use crate::diagnose::scene::Scene;
@@ -112,7 +113,7 @@ pub(super) fn events(c: &mut Collector) {
             let count = s.clock_s().iter().map(so_far).collect();
             c.windows(format!("number of {kind} so far"), "time_since_event", "after logged events", count);
         }
-        if !matches!(kind, "water_dump" | "evaporator" | "thruster" | "crew_sleep") {
+        if !LOGGED_KINDS.contains(&kind) {
             c.windows(
                 format!("{kind} lasts"),
                 "time_since_event",

@@ -19,10 +19,11 @@ use crate::diagnose::measured::{Answer, Plates, log_score};
 /// Posterior from which on a term that all arcs together show is an effect of one of them.
 const SHOWN: f64 = 0.5;
 
-/// Times by which a prediction beyond the fit may be worse with a term that is named.
+/// Times by which a prediction beyond the fit may be worse with a term that is named: a push that is there makes it better, and one that is
+/// small may by chance not.
 const WORSE_MAX: f64 = 1.5;
 
-/// Times the stated accuracy from which on what remains of an arc is told.
+/// Times the stated accuracy from which on what remains of an arc is told: half of what makes it unexplained.
 const LOUD: f64 = 2.0;
 
 /// Every arc's estimates of every accepted term.

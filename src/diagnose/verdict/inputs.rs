@@ -1,27 +1,18 @@
-//! What must be known of what was given: windows left out, a log of another clock, a simulation of another size. Not here: what was
+//! What must be known of what was given: windows left out, a log of another clock or spelling, deviations that do not hold. Not here: what was
 //! found in it.
 
 use crate::diagnose::bursts::OUT;
 use crate::diagnose::case::{Event, KINDS_TRIED, SPIKE};
+use crate::diagnose::catalogue::LOGGED_KINDS;
 use crate::diagnose::noise::Contradicted;
 use crate::diagnose::scene::Scene;
-use crate::math::rms::rms_about_mean;
-use crate::physics::Vec3;
-use crate::units::NANO_G_M_S2;
 
 /// A log all of whose entries are farther from the recording may be of another clock, s.
 const LOG_AWAY_S: f64 = 2.0 * 86_400.0;
-/// Kinds of entries that effects of the catalogue go by.
-const KINDS: [&str; 4] = ["water_dump", "evaporator", "thruster", "crew_sleep"];
-/// Times by which a simulation must be smaller or larger than this project's own gravity gradient, rotation and drag for that to be
-/// told, and how large the larger then is, ng.
-const OTHER_SIZE: f64 = 100.0;
-const OWN_SIZE_NG: f64 = 20.0;
 
 /// All of it, in sentences.
 pub fn of_inputs(scene: &Scene) -> Vec<String> {
     let mut notes = of_windows(scene);
-    notes.extend(of_the_simulation(scene));
     notes.extend(of_the_log(scene));
     notes.extend(of_the_noise(scene));
     notes
@@ -46,23 +37,6 @@ fn of_windows(scene: &Scene) -> Vec<String> {
     told.iter().filter(|(count, _)| *count > 0).map(|(count, why)| format!("{count} {why}")).collect()
 }
 
-/// A simulation of another size than anything that its vehicle feels: of another unit, or without it all.
-fn of_the_simulation(scene: &Scene) -> Option<String> {
-    let offset_m = scene.vehicle.sensor_offset_m;
-    let felt = |i: usize| scene.tensor_s2(i) * offset_m / NANO_G_M_S2 + scene.drag_ng[i];
-    let own: Vec<Vec3> = (0..scene.grid_s.len()).map(felt).collect();
-    let of_axes = |axis: &dyn Fn(usize) -> f64| (0..3).map(|k| axis(k).powi(2)).sum::<f64>().sqrt();
-    let own_ng = of_axes(&|k| rms_about_mean(&own.iter().map(|a| a[k]).collect::<Vec<f64>>()));
-    let simulated_ng = of_axes(&|k| rms_about_mean(&scene.case.simulation.a_ng[k]));
-    let apart = simulated_ng * OTHER_SIZE < own_ng || simulated_ng > own_ng * OTHER_SIZE;
-    (apart && own_ng.max(simulated_ng) > OWN_SIZE_NG).then(|| {
-        format!(
-            "the simulation varies by {simulated_ng:.3} ng rms, gravity gradient, rotation and drag of this vehicle by {own_ng:.1} ng: it \
-             may be of another unit, or lack them"
-        )
-    })
-}
-
 /// A log of more kinds than are tried, of another spelling, or of another clock.
 fn of_the_log(scene: &Scene) -> Vec<String> {
     let kinds = scene.case.kinds();
@@ -83,7 +57,7 @@ fn of_the_log(scene: &Scene) -> Vec<String> {
             LOG_AWAY_S / 86_400.0
         ));
     }
-    let moments = events.iter().filter(|e| e.duration_s == 0.0 && KINDS.contains(&e.kind.as_str())).count();
+    let moments = events.iter().filter(|e| e.duration_s == 0.0 && LOGGED_KINDS.contains(&e.kind.as_str())).count();
     if moments > 0 {
         notes.push(format!(
             "{moments} entries of the log last no time at all: whatever goes on for as long as they do has no windows"
@@ -95,7 +69,7 @@ fn of_the_log(scene: &Scene) -> Vec<String> {
 /// A kind that is one of the catalogue's but for how it is written.
 fn misspelt(kind: &str) -> Option<String> {
     let plain = kind.trim().to_lowercase().replace([' ', '-'], "_");
-    let listed = KINDS.iter().find(|listed| **listed == plain && **listed != kind)?;
+    let listed = LOGGED_KINDS.iter().find(|listed| **listed == plain && **listed != kind)?;
     Some(format!(
         "the log's \"{kind}\" is no kind that the catalogue goes by, and a kind of its own here: is it {listed}?"
     ))

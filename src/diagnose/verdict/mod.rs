@@ -23,7 +23,7 @@ use self::judge::{Judged, judge};
 use self::limits::upper_limits;
 use self::named::name;
 use self::nearest::nearest;
-use self::proportion::of_proportion;
+use self::proportion::{of_proportion, of_the_simulation};
 use self::stands::tried;
 use self::unnamed::{hypothesis, near_fail, of_failure, of_remains};
 use super::answer::{Diagnosis, LEAST_PROBABILITY, Located, Source, Verdict};
@@ -126,6 +126,7 @@ fn of_the_mismatch(
     notes.extend(of_unknown_keys(scene));
     notes.extend(of_unknown_claims(scene));
     notes.extend(of_proportion(scene));
+    notes.extend(of_the_simulation(scene));
     notes.extend(of_resonances(&solution.null));
     notes.extend(of_colour(solution.statistic() - proof.statistic));
     let (listed, refusals) = credible(scene, library, &solution.listed);
