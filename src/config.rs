@@ -199,7 +199,7 @@ fn settings(root: &mut Section<'_>) -> Settings {
         }
         instrument.scale_correction_sigma =
             section.number("scale_correction_sigma", instrument.scale_correction_sigma, 0.0..=1.0);
-        section.numbers("radius_m", &mut instrument.radius_m, 0.0..=10.0);
+        section.numbers("radius_m", &mut instrument.radius_m, 0.001..=10.0);
         section.numbers("full_scale_a_ng", &mut instrument.full_scale_a_ng, 1.0..=1e9);
         instrument.systematic_bias_ng = section.number("systematic_bias_ng", instrument.systematic_bias_ng, 0.0..=1e6);
         instrument.systematic_scale = section.number("systematic_scale", instrument.systematic_scale, 0.0..=1.0);
@@ -299,6 +299,15 @@ mod tests {
         {
             assert!(told.contains(value), "{value} is not in: {told}");
         }
+    }
+
+    /// Whoever writes the table wants a running diagnosis.
+    #[test]
+    fn an_empty_diagnosis_is_a_fault_and_an_absent_one_is_none() {
+        let faults = Config::from_toml("[diagnosis]").unwrap_err();
+        let places: Vec<&str> = faults.0.iter().map(|fault| fault.place.as_str()).collect();
+        assert_eq!(places, ["diagnosis.simulation", "diagnosis.ancillary"]);
+        assert!(Config::from_toml("").unwrap().diagnosis.is_none());
     }
 
     #[test]

@@ -30,9 +30,9 @@ pub struct DiagnosisConfig {
     pub policy: Policy,
 }
 
-/// The section `[diagnosis]`; `None` when it says nothing.
+/// The section `[diagnosis]`; `None` where there is none.
 pub(super) fn read(section: &mut Section<'_>, folder: &Path) -> Option<DiagnosisConfig> {
-    if section.is_silent() {
+    if !section.is_written() {
         return None;
     }
     let has_case = section.has("case");

@@ -14,17 +14,20 @@ use super::Fault;
 pub struct Section<'a> {
     path: String,
     table: toml::Table,
+    /// Whether the text has it: an absent table is read as an empty one.
+    written: bool,
     faults: &'a mut Vec<Fault>,
 }
 
 impl<'a> Section<'a> {
     /// Begins to read a table.
     pub fn new(path: &str, table: toml::Table, faults: &'a mut Vec<Fault>) -> Self {
-        Self { path: path.into(), table, faults }
+        Self { path: path.into(), table, written: true, faults }
     }
 
     /// Reads a table within this one; an absent table is an empty one.
     pub fn section<T>(&mut self, key: &str, read: impl FnOnce(&mut Section<'_>) -> T) -> T {
+        let written = self.table.contains_key(key);
         let table = match self.table.remove(key) {
             None => toml::Table::new(),
             Some(Value::Table(table)) => table,
@@ -33,7 +36,7 @@ impl<'a> Section<'a> {
                 toml::Table::new()
             }
         };
-        let mut section = Section::new(&self.place(key), table, self.faults);
+        let mut section = Section { written, ..Section::new(&self.place(key), table, self.faults) };
         let value = read(&mut section);
         section.finish();
         value
@@ -92,9 +95,9 @@ impl<'a> Section<'a> {
         is_there.then_some(path)
     }
 
-    /// Whether nothing at all is said.
-    pub fn is_silent(&self) -> bool {
-        self.table.is_empty()
+    /// Whether the text has this table, be it empty.
+    pub fn is_written(&self) -> bool {
+        self.written
     }
 
     /// Whether a key is there.

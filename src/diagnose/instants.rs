@@ -9,6 +9,8 @@ const MANOEUVRE: f64 = 8.0;
 const ROUNDING_RAD_S2: f64 = 1e-7;
 /// A change of attitude is over when it does not go on for so long, s: it is turned by one push and stopped by another.
 const STILL_S: f64 = 1800.0;
+/// What begins so near to the start or end of a change of attitude, s, may be of it.
+const TURN_S: f64 = 120.0;
 /// Most instants that are looked at as one series of them: what happens oftener happens all the time.
 const OFTEN: usize = 64;
 
@@ -55,6 +57,21 @@ pub fn changes_of_attitude(s: &Scene) -> [Vec<f64>; 2] {
     [first.collect(), last.map(|(_, t)| *t).collect()]
 }
 
+/// What a push from an instant on takes for granted where the vehicle is turned or stopped just then: that it is not the turn's doing.
+pub fn of_a_turn(s: &Scene, onset_s: f64) -> Option<String> {
+    let [begins, ends] = changes_of_attitude(s);
+    let of = |which: &'static str, all: Vec<f64>| all.into_iter().map(move |t| (which, t));
+    let nearest = of("begins", begins).chain(of("ends", ends));
+    let (which, at_s) = nearest.min_by(|a, b| (a.1 - onset_s).abs().total_cmp(&(b.1 - onset_s).abs()))?;
+    let apart_s = (at_s - onset_s).abs();
+    (apart_s <= TURN_S).then(|| {
+        format!(
+            "its onset is {apart_s:.0} s from where a change of attitude {which}, at {at_s:.0} s, and that is taken for chance: what a turn \
+             moves or warms, a fluid or a structure, begins there as well"
+        )
+    })
+}
+
 /// How much is left at the start of each entry of what the one before had when it ended, and that dies away; nothing at the first.
 pub fn still_warm(spans: &[[f64; 2]], tau_s: f64) -> Vec<f64> {
     let left = |pair: &[[f64; 2]]| (-(pair[1][0] - pair[0][1]).max(0.0) / tau_s).exp();
@@ -98,7 +115,12 @@ pub fn recurring(s: &Scene) -> Vec<Recurring> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::diagnose::catalogue::made;
+    use crate::diagnose::scene::Surroundings;
+    use crate::physics::Vec3;
 
     #[test]
     fn a_level_is_crossed_between_two_points_up_and_down() {
@@ -106,5 +128,23 @@ mod tests {
         let found = crossings(&grid, &[0.0, 0.0, 1.0, 1.0, 0.2], 0.6);
         let expected = [(16.0, 1.0), (35.0, -1.0)];
         assert!(found.len() == 2 && found.iter().zip(expected).all(|(a, b)| (a.0 - b.0).abs() < 1e-9 && a.1 == b.1));
+    }
+
+    #[test]
+    fn an_onset_at_a_turn_is_told_and_one_beside_it_is_not() {
+        let case = made::case();
+        let mut surroundings = Surroundings::new(&case.expected).unwrap();
+        let turn = surroundings.grid_s.len() / 2;
+        surroundings.wdot_rad_s2[turn] = Vec3::new(0.0, 1e-5, 0.0);
+        let scene = Scene::within(&case, Arc::new(surroundings));
+        let [begins, ends] = changes_of_attitude(&scene);
+        let all = [&begins[..], &ends[..]].concat();
+        assert_eq!(all.len(), 2);
+        let told = of_a_turn(&scene, all[0] - 100.0).unwrap();
+        assert!(told.contains("its onset is 100 s from where a change of attitude"), "{told}");
+        let [start, end] = scene.span_s();
+        let far = |t: &f64| all.iter().all(|turn| (turn - t).abs() > TURN_S + 1.0);
+        let beside = (0..1000).map(|i| start + (end - start) * f64::from(i) / 1000.0).find(far).unwrap();
+        assert_eq!(of_a_turn(&scene, beside), None);
     }
 }

@@ -3,6 +3,8 @@
 //! Everything compared with the recording passes through here: the simulation and every regressor alike. A mask is
 //! a window that is absent from `clock_s`; nothing is ever filled in.
 
+use std::ops::{Add, Mul};
+
 use super::case::HALF_WINDOW_S;
 
 /// Window means at given instants of a series on a given grid, the series being linear between its grid points.
@@ -74,21 +76,26 @@ impl Measurement {
     }
 }
 
-/// What follows a series with a time constant, the series being linear between its grid points; it begins as the series does.
-pub fn relaxing(grid: &[f64], series: &[f64], tau_s: f64) -> Vec<f64> {
-    let mut out = Vec::with_capacity(series.len());
-    let mut state = series.first().copied().unwrap_or(0.0);
-    for (i, value) in series.iter().enumerate() {
-        if i > 0 {
-            state = relaxed(state, [series[i - 1], *value], grid[i] - grid[i - 1], tau_s);
-        }
-        out.push(state);
-    }
-    out
+/// What follows a series with a time constant, the series, of numbers or vectors, being linear between its grid points; it begins as the
+/// series does.
+pub fn relaxing<T>(grid: &[f64], series: &[T], tau_s: f64) -> Vec<T>
+where
+    T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+{
+    let Some(first) = series.first() else { return Vec::new() };
+    let mut state = *first;
+    let steps = grid.windows(2).zip(series.windows(2)).map(|(t, x)| {
+        state = relaxed(state, [x[0], x[1]], t[1] - t[0], tau_s);
+        state
+    });
+    std::iter::once(*first).chain(steps.collect::<Vec<T>>()).collect()
 }
 
 /// Where what follows with a time constant comes to from a `state`, while what it follows goes straight `from` one value to another.
-pub fn relaxed(state: f64, [from, to]: [f64; 2], step_s: f64, tau_s: f64) -> f64 {
+pub fn relaxed<T>(state: T, [from, to]: [T; 2], step_s: f64, tau_s: f64) -> T
+where
+    T: Add<Output = T> + Mul<f64, Output = T>,
+{
     let decay = (-step_s / tau_s).exp();
     // Of a ramp over the step, its end counts by `ramp` and its beginning by what is left of the step's own share.
     let ramp = 1.0 - (1.0 - decay) * tau_s / step_s;
@@ -188,6 +195,7 @@ pub fn decay(clock_s: &[f64], onset_s: f64, tau_s: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::physics::Vec3;
 
     #[test]
     fn a_window_mean_of_a_line_is_its_value_at_the_centre_and_of_a_parabola_exceeds_it_as_the_trapezoid_does() {
@@ -231,5 +239,18 @@ mod tests {
         assert_eq!(step, vec![0.0, 0.5, 1.0]);
         let slow = decay(&[100.0, 125.0, 150.0], 125.0, 1e9);
         assert!(step.iter().zip(slow).all(|(a, b)| (a - b).abs() < 1e-6));
+    }
+
+    /// A step from one grid point to the next is a ramp: what follows it is e^(-t/tau) short of its end, by the mean of that over the ramp.
+    #[test]
+    fn what_follows_a_step_comes_near_it_exponentially_on_every_axis() {
+        let grid_s: Vec<f64> = (0..200).map(|i| 20.0 * f64::from(i)).collect();
+        let step: Vec<Vec3> = grid_s.iter().map(|t| Vec3::new(f64::from(u8::from(*t > 1000.0)), 1.0, 0.0)).collect();
+        let late = relaxing(&grid_s, &step, 400.0);
+        let at = |t: f64| late[(t / 20.0) as usize];
+        assert_eq!((at(1000.0).x, at(1000.0).y), (0.0, 1.0));
+        let short: f64 =
+            (0..20_000).map(|i| (-(400.0 - 0.001 * (f64::from(i) + 0.5)) / 400.0).exp()).sum::<f64>() / 20_000.0;
+        assert!((at(1400.0).x - (1.0 - short)).abs() < 1e-9, "{} {short}", at(1400.0).x);
     }
 }

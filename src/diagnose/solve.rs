@@ -170,7 +170,7 @@ fn solve_from(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3], stop
 }
 
 /// The noise with hardly any slow part, `None` where it has hardly any.
-fn quiet(noise: &[AxisNoise; 3]) -> Option<[AxisNoise; 3]> {
+pub fn quiet(noise: &[AxisNoise; 3]) -> Option<[AxisNoise; 3]> {
     let level = |n: &AxisNoise| QUIET_SHARE * n.white_ng;
     noise
         .iter()

@@ -5,6 +5,7 @@ use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::case::Case;
 use oare_ground::diagnose::measure::{weighted_coverage, window_means};
 use oare_ground::diagnose::{Settings, diagnose};
+use oare_ground::physics::{shadow, sun};
 
 /// Deviation of each law over the record, ng.
 const SIZE_NG: f64 = 45.0;
@@ -159,4 +160,31 @@ fn a_push_that_grows_is_no_residual_of_every_firing() {
     assert!(found.hypothesis.is_none(), "{:?}", found.hypothesis);
     let told = found.notes.join("\n");
     assert!(told.contains("the size of thruster_residual is not the same throughout, but follows the time"), "{told}");
+}
+
+/// In sunlight or asleep, and not both: neither alone says anything of it.
+#[test]
+fn a_law_of_two_conditions_is_told_as_their_product() {
+    let either = |case: &Case| {
+        let ancillary = &case.expected.ancillary;
+        let asleep = case.spans("crew_sleep");
+        let at = |(t, r): (&f64, &[f64; 3])| {
+            let lit = shadow::sunlit_fraction(&(*r).into(), &sun::direction(case.header.unix_s(*t)));
+            let sleeps = asleep.iter().any(|[from, to]| (from..to).contains(&t));
+            if sleeps { 1.0 - lit } else { lit }
+        };
+        let series: Vec<f64> = ancillary.clock_s.iter().zip(&ancillary.r_m).map(at).collect();
+        window_means(&ancillary.clock_s, &series, &case.recording.clock_s, 0.0)
+    };
+    is_unlisted(&with(either, [0.1, -0.05, 0.2]), "nu (crew_sleep lasts)");
+}
+
+/// A pump with two outlets that takes them in turn.
+#[test]
+fn what_turns_its_sense_from_entry_to_entry_is_no_push_of_them() {
+    let in_turn = |case: &Case| {
+        let signs = [1.0, -1.0].into_iter().cycle();
+        weighted_coverage(&case.recording.clock_s, case.spans("evaporator").into_iter().zip(signs))
+    };
+    is_unlisted(&with(in_turn, [0.7, 0.5, -0.4]), "evaporator lasts, its sign changed from entry to entry");
 }

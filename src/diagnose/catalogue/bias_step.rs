@@ -1,6 +1,7 @@
 //! The bias steps at an instant and stays.
 
 use super::{Effect, ONSET, SELDOM_LARGE, Shape, Theta, in_sensor, onsets, push};
+use crate::diagnose::instants::of_a_turn;
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -19,7 +20,7 @@ pub const EFFECT: Effect = Effect {
     log_density,
     signature,
     exact_at: None,
-    assumes: None,
+    assumes: Some(|scene, theta| of_a_turn(scene, theta[0])),
     why: "Each sensor axis jumps once, at one instant, and stays there whatever the attitude does.",
 };
 

@@ -1,6 +1,9 @@
 //! A push while a logged event of kind `thruster` lasts.
+//!
+//! Entries that overlap are two jets that push twice, or one that pushes once and is logged with time to spare: no log says which, and where
+//! it matters the record does.
 
-use super::{Effect, SELDOM_LARGE, Shape, added, no_density, one_point, push};
+use super::{Effect, SELDOM_LARGE, Shape, Theta, added, lasting, no_density, push};
 use crate::diagnose::scene::Scene;
 
 /// The entry.
@@ -14,16 +17,30 @@ pub const EFFECT: Effect = Effect {
     linear: &push(150.0, 3000.0),
     scales: SELDOM_LARGE,
     nonlinear: &[],
-    grid: one_point,
+    grid,
     log_density: no_density,
     signature,
     exact_at: None,
-    assumes: None,
+    assumes: Some(assumes),
     why: "The residual is a push fixed in the body that is there only while logged firings last.",
 };
 
-fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    added(scene, "thruster").map(Shape::scalar)
+/// Ways to count entries that overlap.
+const EACH: f64 = 0.0;
+const ONCE: f64 = 1.0;
+
+fn grid(scene: &Scene) -> Vec<Theta> {
+    let overlap = added(scene, "thruster") != lasting(scene, "thruster");
+    if overlap { vec![[EACH, 0.0], [ONCE, 0.0]] } else { vec![[EACH, 0.0]] }
+}
+
+fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
+    let share = if theta[0] == ONCE { lasting } else { added };
+    share(scene, "thruster").map(Shape::scalar)
+}
+
+fn assumes(_: &Scene, theta: &Theta) -> Option<String> {
+    (theta[0] == ONCE).then(|| "firings of the log that overlap push once and not each".to_string())
 }
 
 #[cfg(test)]
@@ -31,10 +48,14 @@ mod tests {
     use super::*;
     use crate::diagnose::catalogue::made;
 
-    /// Two jets that fire at once push twice.
+    /// From 104000 s to 104080 s and from 104040 s to 104120 s: of the window from 104025 s to 104075 s all and 35 s.
     #[test]
-    fn firings_that_overlap_add_up() {
-        // From 104000 s to 104080 s and from 104040 s to 104120 s: of the window from 104025 s to 104075 s all and 35 s.
-        made::has_shares(&EFFECT, [0.0; 2], &[(103_975.0, 0.0), (104_050.0, 1.7), (104_125.0, 0.4)]);
+    fn firings_that_overlap_add_up_or_push_once() {
+        made::has_shares(&EFFECT, [EACH, 0.0], &[(103_975.0, 0.0), (104_050.0, 1.7), (104_125.0, 0.4)]);
+        made::has_shares(&EFFECT, [ONCE, 0.0], &[(103_975.0, 0.0), (104_050.0, 1.0), (104_125.0, 0.4)]);
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        assert_eq!(grid(&scene).len(), 2);
+        assert!(assumes(&scene, &[ONCE, 0.0]).is_some() && assumes(&scene, &[EACH, 0.0]).is_none());
     }
 }

@@ -1,12 +1,10 @@
 //! Forms with a memory: after the edges of the shadow, after logged events, after manoeuvres, late behind the attitude, with the time.
 
-use std::ops::{Add, Mul, Sub};
-
 use super::Collector;
 use crate::diagnose::case::HALF_WINDOW_S;
 use crate::diagnose::catalogue::LOGGED_KINDS;
 use crate::diagnose::instants::{manoeuvres, still_warm, terminators};
-use crate::diagnose::measure::{coverage, decay, union, weighted_coverage};
+use crate::diagnose::measure::{coverage, decay, relaxing, union, weighted_coverage};
 use crate::diagnose::scene::Scene;
 use crate::math::robust::median;
 use crate::physics::Vec3;
@@ -104,6 +102,7 @@ pub(super) fn events(c: &mut Collector) {
         }
         c.family("time_since_event", "after logged events", after_both_ends(s, kind, &spans));
         c.family("time_since_event", "while logged events last", close_ones(s, kind, &spans));
+        c.family("time_since_event", "while logged events last", alternating(s, kind, &spans));
         echoes(c, kind, &ends);
         for (what, list) in [("start", &starts), ("end", &ends)] {
             c.family("time_since_event", "between logged events", ramps(s, kind, what, list));
@@ -133,21 +132,6 @@ pub(super) fn events(c: &mut Collector) {
     }
 }
 
-/// What follows a series late, by a relaxation of the first order from its first value on.
-pub(super) fn follower<T>(grid_s: &[f64], series: &[T], tau_s: f64) -> Vec<T>
-where
-    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
-{
-    let mut state = series[0];
-    let mut before_s = grid_s[0];
-    let follow = |(t, x): (&f64, &T)| {
-        state = *x + (state - *x) * (-(t - before_s) / tau_s).exp();
-        before_s = *t;
-        state
-    };
-    grid_s.iter().zip(series).map(follow).collect()
-}
-
 /// Whatever follows the attitude late, as what the Earth or the Sun warms.
 pub(super) fn attitude(c: &mut Collector) {
     let s = c.scene;
@@ -160,13 +144,24 @@ pub(super) fn attitude(c: &mut Collector) {
             let mut late = direction.clone();
             // What warms may warm another, and that pushes.
             for after in ["relaxing", "relaxing twice"] {
-                late = follower(&s.grid_s, &late, tau_s);
+                late = relaxing(&s.grid_s, &late, tau_s);
                 let parts = [0, 1, 2].map(|k| s.measure_scalar(|g| late[g][k]));
                 members.push((format!("x, y, z of {what} in the body, {after} in {tau_s:.0} s"), parts.to_vec()));
             }
         }
         c.several_family(covariate, "after changes of attitude", members);
     }
+}
+
+/// A push while an entry lasts that turns its sense from one entry to the next.
+fn alternating(s: &Scene, kind: &str, spans: &[[f64; 2]]) -> Vec<(String, Vec<f64>)> {
+    const ENOUGH: usize = 4;
+    if spans.len() < ENOUGH {
+        return Vec::new();
+    }
+    let signs = [1.0, -1.0].into_iter().cycle();
+    let formula = format!("{kind} lasts, its sign changed from entry to entry");
+    vec![(formula, weighted_coverage(s.clock_s(), spans.iter().copied().zip(signs)))]
 }
 
 /// What dies away after the start and after the end of every entry alike, or in the opposite sense: of entries that last longer than it
@@ -327,15 +322,5 @@ mod tests {
         }
         // Weeks are searched as coarsely as the quick lines.
         assert!(lines(300.0).concat().len() < 120);
-    }
-
-    #[test]
-    fn a_follower_is_at_63_percent_of_a_step_after_its_time() {
-        let grid_s: Vec<f64> = (0..200).map(|i| 20.0 * f64::from(i)).collect();
-        let step: Vec<Vec3> = grid_s.iter().map(|t| Vec3::new(f64::from(u8::from(*t > 1000.0)), 1.0, 0.0)).collect();
-        let late = follower(&grid_s, &step, 400.0);
-        let at = |t: f64| late[(t / 20.0) as usize];
-        assert_eq!((at(1000.0).x, at(1000.0).y), (0.0, 1.0));
-        assert!((at(1400.0).x - (1.0 - (-1.0f64).exp())).abs() < 1e-12, "{}", at(1400.0).x);
     }
 }

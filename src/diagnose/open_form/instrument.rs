@@ -1,7 +1,8 @@
 //! Forms of the sensor: its own signal, and its temperature.
 
-use super::history::{LATE_S, follower};
+use super::history::LATE_S;
 use super::{AXIS, Collector};
+use crate::diagnose::measure::relaxing;
 use crate::diagnose::scene::Scene;
 use crate::physics::Vec3;
 
@@ -83,7 +84,7 @@ pub(super) fn sensor(c: &mut Collector) {
         });
         c.family("modelled_signal", place, beyond);
         let late = LATE_S.map(|tau_s| {
-            let late = follower(&s.grid_s, &s.simulated_grid_ng[i], tau_s);
+            let late = relaxing(&s.grid_s, &s.simulated_grid_ng[i], tau_s);
             (format!("m{}, relaxing in {tau_s:.0} s", AXIS[i]), s.measure_scalar(|g| late[g]))
         });
         c.family("modelled_signal", "after changes of the modelled signal", late);

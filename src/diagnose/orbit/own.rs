@@ -1,13 +1,14 @@
 //! A push of radiation or air that one satellite has for itself: where an arc keeps more than the stated accuracy allows with all that
 //! is common, and one term of the catalogue takes that away.
 //!
-//! It belongs to that arc and is no common cause. One that another term replaces as well is not named. Not here: what most arcs ask for
+//! It belongs to that arc and is no common cause. One that another term replaces as well is not named, nor one with which the arc is worse
+//! predicted beyond its fit. Not here: what most arcs ask for
 //! (`search`), velocity steps (`manoeuvre`).
 
 use super::arc::ArcFit;
 use super::forces::Term;
 use super::manoeuvre::LEFT_MAX;
-use super::search::{Level, Problem, SCORE_MIN, evidence, with};
+use super::search::{Level, Problem, SCORE_MIN, evidence, no_worse_foretold, with};
 
 /// Evidence by which it must be above every other term that would do: twice the logarithm of odds of twenty.
 const MARGIN: f64 = 6.0;
@@ -42,8 +43,9 @@ fn of_arc(problem: &Problem, level: &Level, i: usize) -> Option<Own> {
     let tried = |term: Term| {
         let with = problem.fit_arc(arc, &with(&level.baseline, term), Some(fit));
         let is = with.rms_m(0..arc.fitted);
+        let foretold = no_worse_foretold(arc, [fit, &with]);
         let own = Own { arc: i, term, score: evidence(arc, fit, term), rms_m: [was, is], fit: with };
-        (is <= problem.rms_max_m() && is < LEFT_MAX * was && own.score > SCORE_MIN).then_some(own)
+        (foretold && is <= problem.rms_max_m() && is < LEFT_MAX * was && own.score > SCORE_MIN).then_some(own)
     };
     let free = problem.candidates(&level.baseline).into_iter().filter(|term| !term.is_known_size());
     let mut all: Vec<Own> = free.filter_map(tried).collect();

@@ -7,7 +7,9 @@ use super::forces::{Finer, Term};
 use super::held_out::missed_m;
 use super::manoeuvre::Manoeuvre;
 use super::own::Own;
-use super::search::{Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, predicted_m, projected_rms_m};
+use super::search::{
+    Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, no_worse_foretold, predicted_m, projected_rms_m,
+};
 use crate::diagnose::answer::{Alternative, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, StepAnswer, in_order, parameter, posterior,
@@ -18,10 +20,6 @@ use crate::diagnose::measured::{Answer, Plates, log_score};
 
 /// Posterior from which on a term that all arcs together show is an effect of one of them.
 const SHOWN: f64 = 0.5;
-
-/// Times by which a prediction beyond the fit may be worse with a term that is named: a push that is there makes it better, and one that is
-/// small may by chance not.
-const WORSE_MAX: f64 = 1.5;
 
 /// Times the stated accuracy from which on what remains of an arc is told: half of what makes it unexplained.
 const LOUD: f64 = 2.0;
@@ -89,10 +87,7 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
 fn explains(problem: &Problem, search: &Search, arcs: &[ArcAnswer], step: usize, term: Term) -> bool {
     let [before, after] = [step, step + 1].map(|level| &search.levels[level].fits);
     let asks = |i: usize| evidence(&problem.arcs[i], &before[i], term) > 0.0;
-    let foretold = |i: usize| match [before, after].map(|fits| predicted_m(&problem.arcs[i], &fits[i])) {
-        [Some(before_m), Some(after_m)] => after_m <= WORSE_MAX * before_m,
-        _ => true,
-    };
+    let foretold = |i: usize| no_worse_foretold(&problem.arcs[i], [&before[i], &after[i]]);
     let explained = |i: usize| arcs[i].verdict != Verdict::Unexplained && asks(i) && foretold(i);
     term.is_known_size() || (0..arcs.len()).any(explained)
 }

@@ -242,6 +242,18 @@ pub fn predicted_m(arc: &Arc, fit: &ArcFit) -> Option<f64> {
     (arc.fitted < arc.t_s.len()).then(|| fit.rms_m(arc.fitted..arc.t_s.len()))
 }
 
+/// Times by which a prediction beyond the fit may be worse with a term that is named: a push that is there makes it better, and one that is
+/// small may by chance not.
+const WORSE_MAX: f64 = 1.5;
+
+/// Whether an arc is no worse predicted beyond its fit with a term than without it, where it goes on beyond.
+pub fn no_worse_foretold(arc: &Arc, without_and_with: [&ArcFit; 2]) -> bool {
+    match without_and_with.map(|fit| predicted_m(arc, fit)) {
+        [Some(without_m), Some(with_m)] => with_m <= WORSE_MAX * without_m,
+        _ => true,
+    }
+}
+
 /// A baseline with one more term: known, or estimated with each satellite.
 pub fn with(baseline: &Baseline, term: Term) -> Baseline {
     let mut more = baseline.clone();

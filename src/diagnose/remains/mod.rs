@@ -126,13 +126,13 @@ pub fn loudness_under(left: &Left, schedule: &Schedule, signal: &Axes) -> f64 {
 }
 
 /// The axis with the largest share in it.
-fn mostly(amplitude: [f64; 3]) -> String {
+pub fn mostly(amplitude: [f64; 3]) -> String {
     let named = ["x", "y", "z"].iter().zip(amplitude);
     format!("mostly {}", named.max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |(name, _)| *name))
 }
 
 /// Axes that carry at least a twentieth of the energy.
-fn sharing(amplitude: [f64; 3]) -> Vec<String> {
+pub fn sharing(amplitude: [f64; 3]) -> Vec<String> {
     let total: f64 = amplitude.iter().map(|a| a * a).sum();
     let named = ["x", "y", "z"].iter().zip(amplitude);
     named.filter(|(_, a)| a * a > 0.05 * total).map(|(name, _)| (*name).to_string()).collect()

@@ -18,7 +18,7 @@ pub use entry::{Entry, Family};
 pub use grow::{best_of_entry, grow};
 pub use imitate::imitation;
 pub use refine::refine;
-pub use weigh::{Left, Weighed, fit_noise, residual, weigh_with_own_noise};
+pub use weigh::{Left, Weighed, fit_noise, height, residual, weigh_with_own_noise};
 
 use super::axes;
 use super::catalogue::{Shape, Theta};

@@ -94,14 +94,17 @@ pub fn weigh_with_own_noise(
     }
     refine(scene, &frame, entries, &mut set);
     let left = residual(scene, &frame, entries, &set);
-    let slow = noise::slow_part_marginalised(&noise, &left, &scene.schedule, &scene.loudness);
-    let flicker = noise::where_it_may_be_flicker(&noise, &left, &scene.schedule, &scene.loudness);
-    let log_posterior = frame.log_null
-        + set.score
-        + noise.iter().map(noise::log_prior_but_slow).sum::<f64>()
-        + slow.above_fit
-        + flicker;
+    let (height, slow_evidence) = height(scene, &frame, &noise, &left);
+    let log_posterior = height + set.score;
     let has_flips = scene.schedule.flips.iter().any(|flips| !flips.rest.is_empty());
     let of_flips = if has_flips { set.chosen(&frame).gain_at_flips().max(0.0) } else { 0.0 };
-    Weighed { set, noise, log_posterior, slow_evidence: slow.above_none, of_flips }
+    Weighed { set, noise, log_posterior, slow_evidence, of_flips }
+}
+
+/// Log posterior of noise in a frame, with what a hypothesis leaves there and but for its own score; and the evidence of a slow part.
+pub fn height(scene: &Scene, frame: &Frame, noise: &[AxisNoise; 3], left_ng: &Axes) -> (f64, f64) {
+    let slow = noise::slow_part_marginalised(noise, left_ng, &scene.schedule, &scene.loudness);
+    let flicker = noise::where_it_may_be_flicker(noise, left_ng, &scene.schedule, &scene.loudness);
+    let priors = noise.iter().map(noise::log_prior_but_slow).sum::<f64>();
+    (frame.log_null + priors + slow.above_fit + flicker, slow.above_none)
 }

@@ -31,6 +31,7 @@ use super::axes;
 use super::catalogue::Effect;
 use super::design::Frame;
 use super::instants::recurring;
+use super::joint;
 use super::locate;
 use super::model::{self, MemberFit};
 use super::noise::{AxisNoise, Resonance};
@@ -39,6 +40,7 @@ use super::scene::{Axes, Scene};
 use super::search::{Entry, Family, Member, Set, Weighed};
 use super::solve::{Library, Solution};
 use super::trial::Tried;
+use crate::math::shared_work;
 
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
 const EVIDENCE_SHARE: f64 = 0.8;
@@ -53,6 +55,9 @@ pub fn asked(claim: f64) -> f64 {
 /// taken back for what one record in a thousand has.
 const REMAINS_SHARE: f64 = 0.03;
 const REMAINS_BESIDE: f64 = 0.05;
+
+/// Share of what remains after the evidence that goes to laws of several variables.
+const JOINT_SHARE: f64 = 0.2;
 
 /// Prior sizes are for weighing hypotheses. In what is told of a size they are so many times the usual, or they would draw one that is
 /// several times the usual towards it by a standard error; and bound only what the record cannot say at all.
@@ -283,8 +288,14 @@ fn with_remains(
 ) -> (Verdict, f64, Option<Remains>) {
     let weighed = chosen.unwrap_or(&solution.null);
     let left = weighed.left(scene, &library.entries);
-    let remains = remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness, &recurring(scene))
-        .map(|r| Remains { probability: (proof.chances * r.probability).min(1.0), ..r });
+    let chances =
+        |share: f64| move |r: Remains| Remains { probability: (proof.chances * r.probability / share).min(1.0), ..r };
+    let (asked, joint) = shared_work::both(
+        || remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness, &recurring(scene)),
+        || joint::strongest(scene, &weighed.noise, &left),
+    );
+    let asked = [asked.map(chances(1.0 - JOINT_SHARE)), joint.map(chances(JOINT_SHARE))];
+    let remains = asked.into_iter().flatten().min_by(|a, b| a.probability.total_cmp(&b.probability));
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
     let rarer = if verdict == Verdict::Explained { REMAINS_BESIDE } else { 1.0 };
     let allowed = rarer * (1.0 - EVIDENCE_SHARE) * proof.claim;
