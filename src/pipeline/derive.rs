@@ -23,11 +23,14 @@ pub fn product(
     let mut calibrated = [None; 3];
     for axis in Axis::ALL {
         let Some(axis_window) = &window.axes[axis.index()] else { continue };
-        let (range, corrected) = true_range(window, axis, axis_window.range, corrections, &mut quality);
-        ranges[axis.index()] = Some(range);
-        quality = quality.with_if(Quality::RANGE_CORRECTED, corrected);
-        let measured = measured(window, axis, range, axis_window, policy);
-        calibrated[axis.index()] = calibration.and_then(|calibration| calibration.apply(&measured));
+        let taken_in = true_range(window, axis, axis_window.range, corrections);
+        ranges[axis.index()] = Some(taken_in.unwrap_or(axis_window.range));
+        quality = quality
+            .with_if(Quality::RANGE_CORRECTED, taken_in.is_some_and(|range| range != axis_window.range))
+            .with_if(Quality::RANGE_MIXED, taken_in.is_none());
+        calibrated[axis.index()] = calibration
+            .zip(taken_in)
+            .and_then(|(calibration, range)| calibration.apply(&measured(window, axis, range, axis_window, policy)));
     }
     let acceleration = match calibrated {
         [Some(x), Some(y), Some(z)] => Some(in_body_axes([x, y, z])),
@@ -67,24 +70,16 @@ pub fn products(
     shared_work::map(windows, |window| product(window, calibration, corrections, policy))
 }
 
-/// The range the sensor was in; a window at the edge of a correction holds samples of both.
-fn true_range(
-    window: &Window,
-    axis: Axis,
-    reported: Range,
-    corrections: &[RangeCorrection],
-    quality: &mut Quality,
-) -> (Range, bool) {
+/// The range the sensor was in; `None` at the edge of a correction, where samples of one range carry the name of another and no one
+/// calibration is that of all.
+fn true_range(window: &Window, axis: Axis, reported: Range, corrections: &[RangeCorrection]) -> Option<Range> {
     let end = window.start.plus_tenths(WINDOW_TENTHS);
     let touching =
         corrections.iter().find(|c| c.axis == axis && c.reported == reported && c.from < end && c.to > window.start);
-    let Some(correction) = touching else { return (reported, false) };
-    let whole = correction.from <= window.start && correction.to >= end;
-    *quality = quality.with_if(Quality::RANGE_MIXED, !whole);
-    let centre = window.start.plus_tenths(WINDOW_TENTHS / 2);
-    match correction.from <= centre && centre < correction.to {
-        true => (correction.actual, true),
-        false => (reported, false),
+    match touching {
+        None => Some(reported),
+        Some(whole) if whole.from <= window.start && whole.to >= end => Some(whole.actual),
+        Some(_) => None,
     }
 }
 

@@ -22,8 +22,10 @@ const MANOEUVRE_NG: f64 = 20_000.0;
 const MANOEUVRE_SHARE: f64 = 0.015;
 /// A window speaks for another range when its weight of evidence (natural logarithm) is above this.
 const EVIDENCE_MIN: f64 = 20.0;
-/// Windows that make a span.
+/// Windows that make a span, or the evidence of fewer that does: a window taken in C and named A, or the reverse, has fifty, and of those
+/// named rightly none has ten.
 const WINDOWS_MIN: usize = 3;
+const EVIDENCE_OF_FEW: f64 = 40.0;
 /// Windows without a say that do not end a span.
 const CELLS_BETWEEN_MAX: i64 = 8;
 /// Seconds around the ends of the span of windows in which its true ends are looked for.
@@ -168,7 +170,7 @@ pub fn find(
     }
     spans
         .iter()
-        .filter(|span| span.windows >= WINDOWS_MIN)
+        .filter(|span| span.windows >= WINDOWS_MIN || span.of_axes.iter().sum::<f64>() >= EVIDENCE_OF_FEW)
         .filter_map(|span| settle_span(archive, &usual, windows, span, known_at))
         .collect()
 }
@@ -201,9 +203,15 @@ fn settle_span(
     let (_, reported_range) = *reported.first()?;
     let first = Clock::from_tenths(span.cells[0] * 250);
     let last = Clock::from_tenths((span.cells[1] + 2) * 250);
-    let seconds = |near| seconds_near(archive, usual, &reported, span.actual, near, known_at);
-    let from = end_near(&seconds(first), true)?;
-    let to = end_near(&seconds(last), false)?;
+    let seconds = |from: Clock, to: Clock| {
+        let between = [from.plus_tenths(-SEARCH_TENTHS), to.plus_tenths(SEARCH_TENTHS)];
+        seconds_between(archive, usual, &reported, span.actual, between, known_at)
+    };
+    let (from, to) = if last.tenths() - first.tenths() < 2 * SEARCH_TENTHS {
+        best_run(&seconds(first, last))?
+    } else {
+        (end_near(&seconds(first, first), true)?, end_near(&seconds(last, last), false)?)
+    };
     let corrections = reported
         .iter()
         .map(|(axis, range)| RangeCorrection { from, to, axis: *axis, reported: *range, actual: span.actual })
@@ -214,10 +222,12 @@ fn settle_span(
     let value = (-mean).exp();
     let axes: Vec<Axis> = reported.iter().map(|(axis, _)| *axis).collect();
     let letters: Vec<String> = axes.iter().map(|axis| axis.letter().to_uppercase()).collect();
-    let hours = (to.tenths() - from.tenths()) as f64 / 36_000.0;
+    let lasts_s = (to.tenths() - from.tenths()) as f64 / 10.0;
+    let lasts = if lasts_s < 3600.0 { format!("{lasts_s:.0} s") } else { format!("{:.2} h", lasts_s / 3600.0) };
     let sentence = format!(
-        "For {hours:.2} h the records say range {} in {} while the sensor was in range {}: the samples scatter {} times \
-         less than they would; the windows are calibrated in range {} and flagged range_corrected.",
+        "For {lasts} the records say range {} in {} while the sensor was in range {}: the samples scatter {} times \
+         less than they would; the windows are calibrated in range {} and flagged range_corrected, those at the edges have no \
+         value.",
         reported_range.letter(),
         letters.join(", "),
         span.actual.letter(),
@@ -258,16 +268,15 @@ fn second_evidence(usual: &Usual<'_>, record: &AccRecord, reported: &[(Axis, Ran
     total.clamp(-SECOND_EVIDENCE_MAX, SECOND_EVIDENCE_MAX)
 }
 
-/// The seconds around an instant and what each says, as far as they were known.
-fn seconds_near(
+/// The seconds between two instants and what each says, as far as they were known.
+fn seconds_between(
     archive: &Archive,
     usual: &Usual<'_>,
     reported: &[(Axis, Range)],
     actual: Range,
-    near: Clock,
+    [from, to]: [Clock; 2],
     known_at: Clock,
 ) -> Vec<(Clock, f64)> {
-    let (from, to) = (near.plus_tenths(-SEARCH_TENTHS), near.plus_tenths(SEARCH_TENTHS));
     archive
         .records_between(from, to)
         .filter(|record| record.clock <= known_at)
@@ -278,6 +287,21 @@ fn seconds_near(
             (record.clock, says)
         })
         .collect()
+}
+
+/// The run of seconds with the most evidence: of a span so short that both its ends are near to everything in it.
+fn best_run(seconds: &[(Clock, f64)]) -> Option<(Clock, Clock)> {
+    let (mut best, mut run) = ((0.0, None), (0.0, 0));
+    for (place, (clock, says)) in seconds.iter().enumerate() {
+        if run.0 <= 0.0 {
+            run = (0.0, place);
+        }
+        run.0 += says;
+        if run.0 > best.0 {
+            best = (run.0, Some((seconds[run.1].0, clock.plus_tenths(RECORD_TENTHS))));
+        }
+    }
+    best.1
 }
 
 /// The end of a span: the split of the seconds around it that their evidence favours most.
@@ -299,4 +323,18 @@ fn end_near(seconds: &[(Clock, f64)], is_start: bool) -> Option<Clock> {
         }
     }
     best_clock
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_run_is_from_its_first_second_to_the_end_of_its_last() {
+        let says = |i: i64| if (13..58).contains(&i) && i != 30 { 15.0 } else { -15.0 };
+        let seconds: Vec<(Clock, f64)> = (-90..120).map(|i| (Clock::from_tenths(10 * i), says(i))).collect();
+        assert_eq!(best_run(&seconds), Some((Clock::from_tenths(130), Clock::from_tenths(580))));
+        let none: Vec<(Clock, f64)> = (0..50).map(|i| (Clock::from_tenths(10 * i), -15.0)).collect();
+        assert_eq!(best_run(&none), None);
+    }
 }
