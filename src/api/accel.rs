@@ -39,7 +39,7 @@ pub struct Accel {
 
 /// The latest body-axis acceleration, with its standard error.
 #[utoipa::path(get, path = "/accel", tag = "acceleration",
-    responses((status = 200, body = Accel), (status = 404, description = "there is none yet")))]
+    responses((status = 200, description = "the latest one", body = Accel), (status = 404, description = "there is none yet")))]
 pub async fn accel(State(app): State<Arc<App>>) -> Result<Json<Accel>, Problem> {
     let latest = app.hub.latest().ok_or_else(|| Problem::not_found("there is no calibrated window yet"))?;
     Ok(Json(Accel {
@@ -63,6 +63,7 @@ pub struct Span {
     /// Last window start; the last known without it.
     pub to: Option<String>,
     /// At most so many buckets (1 to 100000; 2000 without it).
+    #[param(value_type = Option<u32>, minimum = 1, maximum = 100_000)]
     pub max_points: Option<String>,
 }
 
@@ -125,7 +126,7 @@ const POINTS_MAX: usize = 100_000;
 
 /// Body-axis acceleration over a span: min, mean and max in buckets.
 #[utoipa::path(get, path = "/accel/history", tag = "acceleration", params(Span),
-    responses((status = 200, body = History)))]
+    responses((status = 200, description = "buckets, and gaps apart", body = History)))]
 pub async fn history(State(app): State<Arc<App>>, Asked(span): Asked<Span>) -> Result<Json<History>, Problem> {
     let from = optional_clock(&app.mission, "from", span.from.as_deref())?;
     let to = optional_clock(&app.mission, "to", span.to.as_deref())?;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use axum::extract::{Query, Request, State};
-use axum::http::header::{AUTHORIZATION, CONTENT_LENGTH, WWW_AUTHENTICATE};
+use axum::http::header::{AUTHORIZATION, CONTENT_LENGTH, RETRY_AFTER, WWW_AUTHENTICATE};
 use axum::http::{HeaderValue, StatusCode};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 
 use super::App;
 use super::problem::Problem;
+use crate::hub::status::Phase;
 
 /// No request of this interface has a body; this much is read past and forgiven.
 pub const BODY_OCTETS_MAX: usize = 64 << 10;
@@ -20,7 +21,22 @@ const URI_OCTETS_MAX: usize = 8 << 10;
 /// Answered without a token: they tell nothing but that the service is there.
 pub(super) const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
 
-/// Turns away what is too large or has no token, and counts what is answered.
+/// Not told while the raw log is being read again: the answer would be that of a part of it, and no one could see that.
+pub(super) const OF_THE_LOG: [&str; 9] = [
+    "/accel",
+    "/accel/history",
+    "/accel/live",
+    "/calibration",
+    "/calibration/history",
+    "/gaps",
+    "/playbacks",
+    "/events",
+    "/anomalies",
+];
+/// After so many seconds a client may ask again.
+const AGAIN_S: &str = "1";
+
+/// Turns away what is too large, has no token or cannot be told yet, and counts what is answered.
 pub async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let response = match refuse(&app, &request) {
         Some(refusal) => refusal,
@@ -41,6 +57,20 @@ fn refuse(app: &App, request: &Request) -> Option<Response> {
         let detail = format!("the body has {octets} octets; {BODY_OCTETS_MAX} at most");
         return Some(Problem::new(StatusCode::PAYLOAD_TOO_LARGE, detail).into_response());
     }
+    refuse_token(app, request).or_else(|| refuse_while_reading(app, request))
+}
+
+/// Nothing of the products while they are not all there.
+fn refuse_while_reading(app: &App, request: &Request) -> Option<Response> {
+    (OF_THE_LOG.contains(&request.uri().path()) && app.board.phase() == Phase::Replaying).then(|| {
+        let detail = "the raw log is being read again after a start; what is asked is known when /readyz says so";
+        let mut response = Problem::new(StatusCode::SERVICE_UNAVAILABLE, detail).into_response();
+        response.headers_mut().insert(RETRY_AFTER, HeaderValue::from_static(AGAIN_S));
+        response
+    })
+}
+
+fn refuse_token(app: &App, request: &Request) -> Option<Response> {
     let token = app.token.as_ref()?;
     if OPEN_PATHS.contains(&request.uri().path()) || presented(request).iter().any(|found| same(found, token)) {
         return None;

@@ -22,8 +22,10 @@ use axum::routing::get;
 use axum::{Json, Router, middleware};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
+use utoipa::PartialSchema;
 use utoipa::openapi::path::Operation;
-use utoipa::openapi::{Content, InfoBuilder, OpenApi, OpenApiBuilder, Response};
+use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityRequirement, SecurityScheme};
+use utoipa::openapi::{ContentBuilder, InfoBuilder, OpenApi, OpenApiBuilder, Ref, RefOr, Response};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
@@ -106,6 +108,15 @@ fn described(openapi: OpenApi) -> OpenApi {
         .description(Some("Quasi-steady acceleration of the Orbiter in body axes, from OARE telemetry"));
     let builder: OpenApiBuilder = openapi.into();
     let mut openapi = builder.info(info.build()).build();
+    let components = openapi.components.get_or_insert_default();
+    components.schemas.insert("Problem".into(), problem::Document::schema());
+    let in_query = ApiKey::Query(ApiKeyValue::new("access_token"));
+    for (name, scheme) in [
+        ("bearer", SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer))),
+        ("query", SecurityScheme::ApiKey(in_query)),
+    ] {
+        components.add_security_scheme(name, scheme);
+    }
     for (path, item) in &mut openapi.paths.paths {
         if let Some(operation) = &mut item.get {
             describe_problems(path, operation);
@@ -114,15 +125,34 @@ fn described(openapi: OpenApi) -> OpenApi {
     openapi
 }
 
-/// The problems that any route of its kind may answer with.
+/// The problems that any route of its kind may answer with, and what a problem looks like.
 fn describe_problems(path: &str, operation: &mut Operation) {
+    let needs_token = !guard::OPEN_PATHS.contains(&path);
     let problems = [
         ("400", "a parameter makes no sense, is given twice, or is none of this route", true),
-        ("401", "the service has a token, and the request does not", !guard::OPEN_PATHS.contains(&path)),
+        ("401", "the service has a token, and the request does not", needs_token),
+        ("413", "the request has a body, and that is too long", true),
         ("414", "path and query are too long", true),
+        (
+            "503",
+            "not yet: the raw log is being read again, or as many live clients as are allowed are connected",
+            guard::OF_THE_LOG.contains(&path),
+        ),
     ];
+    let responses = &mut operation.responses.responses;
     for (status, description, _) in problems.into_iter().filter(|(_, _, may)| *may) {
-        let problem = Response::builder().description(description).content(problem::MEDIA_TYPE, Content::default());
-        operation.responses.responses.entry(status.to_owned()).or_insert_with(|| problem.build().into());
+        responses.entry(status.to_owned()).or_insert_with(|| Response::new(description).into());
+    }
+    let of_a_problem = ContentBuilder::new().schema(Some(Ref::from_schema_name("Problem"))).build();
+    for (_, response) in responses.iter_mut().filter(|(status, _)| status.as_str() >= "400") {
+        if let RefOr::T(response) = response {
+            response.content.insert(problem::MEDIA_TYPE.into(), RefOr::T(of_a_problem.clone()));
+        }
+    }
+    if needs_token {
+        let none: [&str; 0] = [];
+        // Whichever of them, and none where no token is configured.
+        let any = [SecurityRequirement::new("bearer", none), SecurityRequirement::new("query", none)];
+        operation.security = Some(any.into_iter().chain([SecurityRequirement::default()]).collect());
     }
 }

@@ -3,9 +3,22 @@
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
 use problem_details::ProblemDetails;
+use utoipa::ToSchema;
 
 /// The media type of a problem document.
 pub const MEDIA_TYPE: &str = "application/problem+json";
+
+/// A problem document (RFC 9457), as it is described.
+#[derive(ToSchema)]
+#[expect(dead_code, reason = "a description: `problem_details` writes the document")]
+pub struct Document {
+    /// Short, the same for every problem of the status.
+    title: String,
+    /// The HTTP status.
+    status: u16,
+    /// What is wrong with this request, with its value and place.
+    detail: String,
+}
 
 /// What a handler answers when it cannot answer.
 #[derive(Debug)]

@@ -70,7 +70,7 @@ pub struct Gaps {
 }
 
 /// Spans between the first and the last second received that are not covered.
-#[utoipa::path(get, path = "/gaps", tag = "telemetry", responses((status = 200, body = Gaps)))]
+#[utoipa::path(get, path = "/gaps", tag = "telemetry", responses((status = 200, description = "seconds that came, and spans that did not", body = Gaps)))]
 pub async fn gaps(State(app): State<Arc<App>>) -> Json<Gaps> {
     let picture = app.board.picture();
     let gaps = picture.gaps.iter().map(|(from, to)| Gap::new(&app.mission, *from, *to)).collect();
@@ -98,14 +98,14 @@ pub async fn playbacks(State(app): State<Arc<App>>) -> Json<Value> {
 }
 
 /// Events of the instrument, in order.
-#[utoipa::path(get, path = "/events", tag = "telemetry", responses((status = 200, body = [EventWire])))]
+#[utoipa::path(get, path = "/events", tag = "telemetry", responses((status = 200, description = "in order of time", body = [EventWire])))]
 pub async fn events(State(app): State<Arc<App>>) -> Json<Vec<EventWire>> {
     let mission = app.mission;
     Json(ask(&app, move |station| station.events().map(|event| EventWire::new(&mission, event)).collect()).await)
 }
 
 /// What the ground found odd, in order of time.
-#[utoipa::path(get, path = "/anomalies", tag = "telemetry", responses((status = 200, body = [AnomalyWire])))]
+#[utoipa::path(get, path = "/anomalies", tag = "telemetry", responses((status = 200, description = "in order of time", body = [AnomalyWire])))]
 pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
     let mission = app.mission;
     let told = move |station: &Station| -> Vec<AnomalyWire> {

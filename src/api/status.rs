@@ -143,7 +143,7 @@ fn phase_word(phase: &Phase) -> &'static str {
 }
 
 /// What the service says of itself.
-#[utoipa::path(get, path = "/status", tag = "service", responses((status = 200, body = Status)))]
+#[utoipa::path(get, path = "/status", tag = "service", responses((status = 200, description = "the ledger and the state of the service", body = Status)))]
 pub async fn status(State(app): State<Arc<App>>) -> Json<Status> {
     let picture = app.board.picture();
     let counters = &app.board.counters;

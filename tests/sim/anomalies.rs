@@ -199,3 +199,38 @@ fn planted_faults_are_found_and_rightly_named() {
     println!("planted faults of all kinds: {:.2} % found and rightly named", 100.0 * all);
     assert!(all >= FOUND_SHARE && found.iter().all(|share| *share >= FOUND_SHARE_OF_A_KIND), "{found:?}");
 }
+
+/// Under a minute, over a minute, and up to a calibration that begins a minute later: told to the second, and no window, be it at the edge
+/// of the fault, has a value that its error bar does not cover.
+#[test]
+fn a_short_misreport_is_told_and_leaves_no_wrong_value() {
+    for (from_clock_s, seconds, until_s) in [(22_013, 45, 22_058), (22_013, 70, 22_083), (30_007, 180, 30_060)] {
+        let mut config = MissionConfig::sts65(11, 12.0);
+        config.faults.push(Fault::RangeMisreport { from_clock_s, seconds });
+        let flown = fly(config);
+        let told: Vec<(f64, f64)> = flown
+            .derived
+            .anomalies
+            .iter()
+            .filter(|a| a.kind == AnomalyKind::RangeMisreport)
+            .map(|a| (a.from.seconds(), a.to.seconds()))
+            .collect();
+        assert_eq!(told, [(f64::from(from_clock_s), f64::from(until_s))]);
+        let near = f64::from(from_clock_s) - 200.0..f64::from(from_clock_s + seconds) + 200.0;
+        let mut seen = 0;
+        for product in flown.products().filter(|product| near.contains(&product.start.seconds())) {
+            let (Some(found), Some(truth)) =
+                (&product.acceleration, flown.truth.get(&(product.start.seconds() as u32)))
+            else {
+                continue;
+            };
+            for i in 0..3 {
+                let error = found.sigma_ng.0[i].hypot(found.sigma_sys_ng.0[i]);
+                let off = (found.trimmed_ng.0[i] - truth.body_ng[i]) / error;
+                assert!(off.abs() < 6.0, "{:?} axis {i}: {off} sigma, {}", product.start, product.quality);
+                seen += 1;
+            }
+        }
+        assert!(seen > 12, "{seen}");
+    }
+}
