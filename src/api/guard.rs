@@ -1,10 +1,11 @@
 //! What every request passes: its size, and its token where one is configured.
 
 use std::collections::HashMap;
+use std::net::IpAddr;
 use std::sync::Arc;
 
 use axum::extract::{Query, Request, State};
-use axum::http::header::{AUTHORIZATION, CONTENT_LENGTH, RETRY_AFTER, WWW_AUTHENTICATE};
+use axum::http::header::{AUTHORIZATION, CONTENT_LENGTH, HOST, ORIGIN, RETRY_AFTER, WWW_AUTHENTICATE};
 use axum::http::{HeaderValue, StatusCode};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
@@ -57,7 +58,28 @@ fn refuse(app: &App, request: &Request) -> Option<Response> {
         let detail = format!("the body has {octets} octets; {BODY_OCTETS_MAX} at most");
         return Some(Problem::new(StatusCode::PAYLOAD_TOO_LARGE, detail).into_response());
     }
-    refuse_token(app, request).or_else(|| refuse_while_reading(app, request))
+    let refusals = [refuse_token, refuse_foreign_page, refuse_while_reading];
+    refusals.iter().find_map(|refuse| refuse(app, request))
+}
+
+/// Where no token protects the service, its being on the loopback does; but a browser on this machine would let a page of any site in.
+fn refuse_foreign_page(app: &App, request: &Request) -> Option<Response> {
+    let of = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
+    let (_, origin) = of(ORIGIN).filter(|_| app.token.is_none())?.split_once("://")?;
+    let is_here = |authority: &str| {
+        let host = authority
+            .rsplit_once(':')
+            .map_or(authority, |(host, port)| if port.ends_with(']') { authority } else { host });
+        let host = host.trim_start_matches('[').trim_end_matches(']');
+        host.eq_ignore_ascii_case("localhost") || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
+    };
+    let is_own = of(HOST).is_some_and(|host| host.eq_ignore_ascii_case(origin));
+    (!is_here(origin) && !is_own).then(|| {
+        let detail = format!(
+            "a page of {origin} may not read a service that has no token; http.token in its configuration gives it one"
+        );
+        Problem::new(StatusCode::FORBIDDEN, detail).into_response()
+    })
 }
 
 /// Nothing of the products while they are not all there.

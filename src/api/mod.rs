@@ -131,6 +131,7 @@ fn describe_problems(path: &str, operation: &mut Operation) {
     let problems = [
         ("400", "a parameter makes no sense, is given twice, or is none of this route", true),
         ("401", "the service has a token, and the request does not", needs_token),
+        ("403", "the service has no token, and the request is of a page of another site", needs_token),
         ("413", "the request has a body, and that is too long", true),
         ("414", "path and query are too long", true),
         (

@@ -93,6 +93,8 @@ pub struct IngestStatus {
     pub gaps: usize,
     /// End of the last second received, clock s.
     pub latest_clock_s: Option<f64>,
+    /// Start of that second: what is answered now is answered again `as_of` this clock.
+    pub as_of_clock_s: Option<f64>,
     /// Bits of the playbacks that are over.
     pub bits_in: u64,
     /// Playbacks begun.
@@ -170,6 +172,7 @@ pub async fn status(State(app): State<Arc<App>>) -> Json<Status> {
             seconds_covered: picture.seconds_covered,
             gaps: picture.gaps.len(),
             latest_clock_s: picture.latest_clock_s,
+            as_of_clock_s: picture.latest_clock_s.map(|end_s| end_s - 1.0),
             bits_in: picture.bits_in,
             playbacks: picture.playbacks,
             playbacks_open: picture.playbacks_open,

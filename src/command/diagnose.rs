@@ -217,9 +217,13 @@ fn print_table(diagnosis: &Diagnosis) {
             "  rms before {:.1?} ng, after {:.1?} ng, noise floor {:.1?} ng",
             fit.before.rms_ng, fit.after.rms_ng, fit.noise_floor_ng
         );
+        let removed = match fit.confirmed {
+            None if !diagnosis.effects.is_empty() => "what is left in says nothing of what is left out".to_string(),
+            _ => format!("excess removed {:.3}", fit.held_out.excess_removed),
+        };
         println!(
-            "  held out: log score gain {:.1} +- {:.1}, excess removed {:.3}",
-            fit.held_out.log_score_gain, fit.held_out.log_score_gain_se, fit.held_out.excess_removed
+            "  held out: log score gain {:.1} +- {:.1}, {removed}",
+            fit.held_out.log_score_gain, fit.held_out.log_score_gain_se
         );
     }
     for note in &diagnosis.notes {

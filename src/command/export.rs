@@ -7,7 +7,6 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use clap::ValueEnum;
-use oare_ground::hub::{Body, Message};
 use oare_ground::ingest::log_replay::rebuild;
 use oare_ground::ingest::raw_log::{RawLog, StoreError};
 use oare_ground::pipeline::{Station, files};
@@ -71,6 +70,16 @@ pub fn run(args: Args) -> Result<ExitCode> {
         return Ok(super::unusable());
     }
     let log = RawLog::open(&args.data, &settings.mission, &settings.link)?;
+    if log.batches() == 0 {
+        let (mission, spacecraft) = (&settings.mission, settings.link.spacecraft_id);
+        let held = match log.held_for()? {
+            held if held.is_empty() => "it holds none at all".to_string(),
+            held => format!("it holds those of {}", held.join("; ")),
+        };
+        let folder = args.data.display();
+        eprintln!("oare export: {folder} has no frame of mission {mission:?}, spacecraft {spacecraft:#x}; {held}");
+        return Ok(super::unusable());
+    }
     let station = match rebuild(&log, &settings) {
         Err(fault @ StoreError::FrameOctets { .. }) => {
             eprintln!("oare export: {fault}");
@@ -116,10 +125,7 @@ fn write_recording(log: &RawLog, station: &Station, out: &std::path::Path, from:
             recording.frame(playback, &arrival)?;
         }
     }
-    let products = station.products().filter(|product| (from..=to).contains(&product.start));
-    for (seq, product) in (1..).zip(products) {
-        recording.message(&Message::new(seq, Body::Window((*product).into())))?;
-    }
+    recording.products(station, from, to)?;
     recording.finish()?;
     Ok(())
 }

@@ -8,13 +8,13 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result};
 use oare_ground::config::Config;
-use oare_ground::hub::{Body, Message};
 use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader, Verdict};
 use oare_ground::pipeline::calibration::KnownCalibration;
 use oare_ground::pipeline::report::report;
 use oare_ground::pipeline::station::replay;
 use oare_ground::pipeline::{PlaybackId, Station, files};
 use oare_ground::record::{mcap_file::Recording, mcap_reader};
+use oare_ground::units::Clock;
 use sha2::{Digest, Sha256};
 
 use super::output::{write, write_report};
@@ -147,9 +147,8 @@ fn write_recording(station: &Station, streams: &[Stream], path: &Path) -> Result
         }
     });
     written.with_context(cannot)?;
-    for (seq, product) in (1..).zip(station.products()) {
-        recording.message(&Message::new(seq, Body::Window((*product).into()))).with_context(cannot)?;
-    }
+    let [first, last] = [i64::MIN, i64::MAX].map(Clock::from_tenths);
+    recording.products(station, first, last).with_context(cannot)?;
     recording.finish().with_context(cannot)?;
     Ok(())
 }

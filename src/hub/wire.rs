@@ -7,8 +7,9 @@ use std::borrow::Cow;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::message::{Body, Message};
-use crate::pipeline::calibration::Anomaly;
+use super::message::{Body, Message, Topic};
+use crate::pipeline::calibration::{Anomaly, Calibration};
+use crate::pipeline::files::version_json;
 use crate::pipeline::product::{BodyAcceleration, BodyVector, Product};
 use crate::telemetry::{AccRecord, Event, Range};
 use crate::units::{Clock, MissionTime};
@@ -20,7 +21,8 @@ pub struct Time {
     pub clock_s: f64,
     /// Mission elapsed time, s since lift-off.
     pub met_s: f64,
-    /// UTC, RFC 3339.
+    /// UTC by the nominal epoch of the mission, RFC 3339: the drift and the jumps of the clock that the dates in the records show stand in
+    /// `calibration.json` (`time_correlation`), and are not in here.
     pub utc: String,
 }
 
@@ -320,6 +322,26 @@ impl AnomalyWire {
             sentence: anomaly.sentence.clone(),
         }
     }
+}
+
+/// What is told whole of an event.
+pub fn told_event(mission: &MissionTime, event: &Event) -> Body {
+    Body::Told { topic: Topic::Event, clock: event.clock, json: members("event", &EventWire::new(mission, event)) }
+}
+
+/// What is told whole of an anomaly.
+pub fn told_anomaly(mission: &MissionTime, anomaly: &Anomaly) -> Body {
+    Body::Told {
+        topic: Topic::Anomaly,
+        clock: anomaly.from,
+        json: members("anomaly", &AnomalyWire::new(mission, anomaly)),
+    }
+}
+
+/// What is told whole of a version of the calibration.
+pub fn told_calibration(version: &Calibration) -> Body {
+    let json = members("calibration", &version_json(version));
+    Body::Told { topic: Topic::Calibration, clock: version.known_since, json }
 }
 
 /// The JSON members of a message, its type first, without the braces.

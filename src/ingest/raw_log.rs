@@ -305,6 +305,26 @@ impl RawLog {
         self.batches.load(Ordering::Acquire)
     }
 
+    /// Of whom the store holds frames, in words: one store may serve several missions and spacecraft.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn held_for(&self) -> Result<Vec<String>, StoreError> {
+        self.with_database(|database| {
+            let transaction = database.begin_read()?;
+            let mut held = Vec::new();
+            let Some(table) = existing(transaction.open_table(BATCHES))? else { return Ok(held) };
+            let mut from = Vec::new();
+            while let Some(row) = table.range(from.as_slice()..)?.next() {
+                let key = row?.0.value().to_vec();
+                let prefix = &key[..key.len().saturating_sub(size_of::<u64>())];
+                held.extend(owner_of_prefix(prefix));
+                from = [prefix, &[0xff; size_of::<u64>() + 1]].concat();
+            }
+            Ok(held)
+        })
+    }
+
     fn batch_octets(&self, number: u64) -> Result<Option<Vec<u8>>, StoreError> {
         let key = self.key(&number.to_be_bytes());
         self.with_database(|database| {
@@ -389,6 +409,13 @@ impl RawLog {
             Ok(journal)
         })
     }
+}
+
+/// The mission and the spacecraft of a prefix, in words.
+fn owner_of_prefix(prefix: &[u8]) -> Option<String> {
+    let mission = prefix.split(|octet| *octet == 0).next()?;
+    let spacecraft = prefix.get(mission.len() + 1..)?.iter().fold(0_u64, |id, octet| id << 8 | u64::from(*octet));
+    Some(format!("mission {:?}, spacecraft {spacecraft:#x}", String::from_utf8_lossy(mission)))
 }
 
 /// A table, where anything was ever written to it.

@@ -15,10 +15,9 @@ use super::listener::Parts;
 use super::log_replay::{Orphans, take_entry, take_log, taken_again};
 use super::raw_log::{Entry, Journal, JournalPart, RawLog, StoreError};
 use crate::hub::status::{Board, Phase, Picture, count};
-use crate::hub::wire::{AnomalyWire, EventWire, Gap, members};
+use crate::hub::wire::{Gap, members, told_anomaly, told_calibration, told_event};
 use crate::hub::{Body, Hub, Journaled, SampleSource, Topic};
 use crate::ingest::wire::playback::PlaybackPart;
-use crate::pipeline::files::version_json;
 use crate::pipeline::{Change, Station};
 use crate::telemetry::AccRecord;
 use crate::units::Clock;
@@ -389,8 +388,8 @@ impl Writer {
         {
             let station = self.station.read().expect("no holder panics");
             changes.retain(|change| match whole(&station, change) {
-                Some((topic, _, json)) => !told.contains(&(topic, json)),
-                None => true,
+                Some(Body::Told { topic, json, .. }) => !told.contains(&(topic, json)),
+                _ => true,
             });
         }
         self.publish(changes);
@@ -433,24 +432,22 @@ fn body(hub: &Hub, station: &Station, change: Change) -> Option<Body> {
             None => Some(Body::Window(product)),
         },
         Change::Raw(record) => Some(Body::Second(record)),
-        change => whole(station, &change).map(|(topic, clock, json)| Body::Told { topic, clock, json }),
+        change => whole(station, &change),
     }
 }
 
-/// What is told whole of a change: its topic, the clock it is about, its JSON members.
-fn whole(station: &Station, change: &Change) -> Option<(Topic, Clock, String)> {
+/// What is told whole of a change.
+fn whole(station: &Station, change: &Change) -> Option<Body> {
     let mission = station.settings().time;
     match change {
         Change::Window { .. } | Change::Raw(_) => None,
-        Change::Gap { from, to } => Some((Topic::Window, *from, members("gap", &Gap::new(&mission, *from, *to)))),
-        Change::Event(event) => Some((Topic::Event, event.clock, members("event", &EventWire::new(&mission, event)))),
-        Change::Anomaly(anomaly) => {
-            Some((Topic::Anomaly, anomaly.from, members("anomaly", &AnomalyWire::new(&mission, anomaly))))
+        Change::Gap { from, to } => {
+            let json = members("gap", &Gap::new(&mission, *from, *to));
+            Some(Body::Told { topic: Topic::Window, clock: *from, json })
         }
-        Change::Calibration { known_since, .. } => {
-            let json = station.calibration().map(version_json)?;
-            Some((Topic::Calibration, *known_since, members("calibration", &json)))
-        }
+        Change::Event(event) => Some(told_event(&mission, event)),
+        Change::Anomaly(anomaly) => Some(told_anomaly(&mission, anomaly)),
+        Change::Calibration { .. } => station.calibration().map(told_calibration),
     }
 }
 

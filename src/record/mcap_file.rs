@@ -11,10 +11,10 @@ use mcap::{McapResult, WriteOptions, Writer};
 
 use super::frame_time::frame_clock;
 use super::schema::{TOPICS, json_schema};
-use crate::hub::wire::passing_members;
+use crate::hub::wire::{passing_members, told_anomaly, told_calibration, told_event};
 use crate::hub::{Body, Message, Topic};
 use crate::ingest::wire::{Arrival, LinkConfig, Verdict};
-use crate::pipeline::Settings;
+use crate::pipeline::{Settings, Station};
 use crate::units::{Clock, MissionTime};
 
 /// The topic of raw frames.
@@ -122,6 +122,28 @@ impl<W: Write + Seek> Recording<W> {
             publish_time: time_ns,
         };
         self.writer.write_to_known_channel(&header, data)
+    }
+
+    /// Writes everything but raw seconds that a station has of a span: windows, versions of the calibration, events and anomalies.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn products(&mut self, station: &Station, from: Clock, to: Clock) -> McapResult<()> {
+        let (mission, derived) = (self.mission, station.derived());
+        let between = |clock: Clock| (from..=to).contains(&clock);
+        let windows = station.products().filter(|product| between(product.start));
+        let versions = derived.timeline.iter().filter(|version| between(version.known_since));
+        let events = station.events().filter(|event| between(event.clock));
+        let anomalies = derived.anomalies.iter().filter(|anomaly| between(anomaly.from));
+        let bodies = windows
+            .map(|product| Body::Window((*product).into()))
+            .chain(versions.map(told_calibration))
+            .chain(events.map(|event| told_event(&mission, event)))
+            .chain(anomalies.map(|anomaly| told_anomaly(&mission, anomaly)));
+        for (seq, body) in (1..).zip(bodies) {
+            self.message(&Message::new(seq, body))?;
+        }
+        Ok(())
     }
 
     /// Writes the index and hands the file back.

@@ -1,5 +1,6 @@
 //! The interface from outside: what is asked, what is answered, who may.
 
+use oare_ground::hub::status::Phase;
 use serde_json::Value;
 
 use crate::service_support::*;
@@ -52,6 +53,16 @@ async fn every_named_route_answers_and_is_described() {
         assert!(described(path, "401") && described(path, "414"), "{path}");
     }
     assert!(!described("/healthz", "401") && !described("/readyz", "401"));
+    // As the standard has it: every response says what it is, every refusal is a problem, and the two ways to show a token are named.
+    for (path, item) in openapi["paths"].as_object().unwrap() {
+        for (status, response) in item["get"]["responses"].as_object().unwrap() {
+            assert!(response["description"].is_string(), "{path} {status}");
+            let schema = &response["content"]["application/problem+json"]["schema"]["$ref"];
+            assert_eq!(status.as_str() >= "400", *schema == "#/components/schemas/Problem", "{path} {status}");
+        }
+    }
+    assert!(openapi["components"]["schemas"]["Problem"]["properties"]["detail"].is_object());
+    assert_eq!(openapi["components"]["securitySchemes"]["query"]["name"], "access_token");
     for path in ["/gaps", "/playbacks", "/events", "/anomalies", "/calibration/history", "/status", "/accel/history"] {
         running.get(path).await;
     }
@@ -99,6 +110,43 @@ async fn a_configured_token_is_needed_everywhere_but_for_health() {
     assert_eq!(live.next().await.unwrap()["type"], "hello");
     let refused = tokio_tungstenite::connect_async(format!("ws://{}/accel/live", running.service.http_address)).await;
     assert!(refused.is_err(), "a WebSocket without the token");
+}
+
+/// A browser lets any page open a socket to this machine, and says whose page it is.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_page_of_another_site_reads_nothing_where_there_is_no_token() {
+    let running = start().await;
+    let client = reqwest::Client::new();
+    let own = format!("http://{}", running.service.http_address);
+    for (origin, status) in [
+        ("http://evil.example", 403),
+        ("https://127.0.0.1.evil.example:8080", 403),
+        ("http://localhost:3000", 200),
+        ("http://[::1]:3000", 200),
+        (&own, 200),
+    ] {
+        let answer = client.get(running.url("/status")).header("Origin", origin).send().await.unwrap();
+        assert_eq!(answer.status(), status, "{origin}");
+    }
+}
+
+/// What was received before is not there yet after a start, and is not said to be nothing.
+#[tokio::test(flavor = "multi_thread")]
+async fn while_the_log_is_read_again_products_are_not_told() {
+    let running = start().await;
+    running.send(&dump(20_000, 300, 0)).await;
+    running.wait_for_playbacks(1).await;
+    running.service.board.enter(Phase::Replaying);
+    for path in
+        ["/accel", "/accel/history", "/accel/live?from=seq:1", "/calibration", "/gaps", "/playbacks", "/anomalies"]
+    {
+        let answer = reqwest::get(running.url(path)).await.unwrap();
+        assert_eq!((answer.status().as_u16(), answer.headers()["retry-after"].to_str().unwrap()), (503, "1"), "{path}");
+        assert!(problem_of(answer).await.1["detail"].as_str().unwrap().contains("raw log"), "{path}");
+    }
+    assert_eq!(running.get("/status").await["phase"], "replaying");
+    running.service.board.enter(Phase::Running);
+    running.get("/gaps").await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -157,7 +205,7 @@ async fn a_calibration_of_the_past_comes_with_the_ranges_corrected_then() {
     let corrected = now["range_corrections"].as_array().unwrap();
     assert!(!corrected.is_empty(), "{now:#}");
     assert!(corrected.iter().all(|c| c["reported"] == "C" && c["actual"] == "A"), "{corrected:?}");
-    let latest = running.get("/status").await["ingest"]["latest_clock_s"].as_f64().unwrap();
+    let latest = running.get("/status").await["ingest"]["as_of_clock_s"].as_f64().unwrap();
     assert_eq!(running.get(&format!("/calibration?as_of={latest}")).await, now);
     let from_s = corrected[0]["from_clock_s"].as_f64().unwrap();
     let before = running.get(&format!("/calibration?as_of={}", from_s - 100.0)).await;

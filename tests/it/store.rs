@@ -368,3 +368,52 @@ async fn fifty_kills_in_a_mission_lose_nothing() {
     let octets: Vec<u8> = passes.into_iter().flat_map(|pass| pass.octets).collect();
     kill_and_restart(&[octets], 50, 2.0, 65).await;
 }
+
+/// The program, in a directory of its own.
+fn oare(dir: &tempfile::TempDir, arguments: &[&str]) -> std::process::Output {
+    Command::new(env!("CARGO_BIN_EXE_oare")).current_dir(dir.path()).args(arguments).output().unwrap()
+}
+
+/// A recording made of a dump holds what its product files do, topic by topic.
+#[test]
+fn a_recording_of_a_dump_holds_its_calibrations_events_and_anomalies() {
+    let dir = tempfile::tempdir().unwrap();
+    for arguments in [
+        &["simulate", "--hours", "6", "--seed", "3", "--out", "a.dump"][..],
+        &["process", "a.dump", "--out", "products"],
+    ] {
+        let output = oare(&dir, arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    let read = |name: &str| std::fs::read(dir.path().join("products").join(name)).unwrap();
+    let octets = read("recording.mcap");
+    let count = |topic: &str| {
+        let messages = mcap::MessageStream::new(&octets).unwrap();
+        messages.filter(|message| message.as_ref().unwrap().channel.topic == topic).count()
+    };
+    let list = |name: &str| serde_json::from_slice::<serde_json::Value>(&read(name)).unwrap();
+    let versions = list("calibration.json")["versions"].as_array().map(Vec::len);
+    assert_eq!(Some(count("/accel/calibration")), versions.filter(|versions| *versions > 0));
+    assert_eq!(count("/accel/anomaly"), list("anomalies.json").as_array().unwrap().len());
+    assert!(count("/accel/event") > 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_export_of_another_spacecraft_says_whose_frames_there_are() {
+    let running = start().await;
+    running.send(&dump(20_000, 300, 0)).await;
+    running.wait_for_playbacks(1).await;
+    let Running { service, dir } = running;
+    service.drain().await.unwrap();
+    std::fs::write(dir.path().join("other.toml"), "[link]\nspacecraft_id = 66\n").unwrap();
+    let arguments = ["export", "--config", "other.toml", "--data", ".", "--format", "csv", "--out", "out"];
+    let output = oare(&dir, &arguments);
+    let told = String::from_utf8_lossy(&output.stderr).to_string();
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert!(
+        told.contains(
+            "no frame of mission \"sts-65\", spacecraft 0x42; it holds those of mission \"sts-65\", spacecraft 0x41"
+        ),
+        "{told}"
+    );
+}

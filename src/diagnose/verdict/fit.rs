@@ -43,6 +43,13 @@ pub fn fit(
             ));
         }
     }
+    if !set.members.is_empty() && tried.confirmed.is_none() {
+        notes.push(format!(
+            "of {} none can foretell another: each has what is found for itself, and held_out.excess_removed = {:.3} speaks neither for it \
+             nor against",
+            tried.blocks.scheme, tried.blocks.excess_removed
+        ));
+    }
     let fit = Fit {
         noise_floor_ng: std::array::from_fn(|k| weighed.noise[k].rms_ng()),
         before: level(&scene.residual_ng, &before, 0.0),

@@ -7,6 +7,7 @@ use super::settling::Transient;
 use super::time_correlation::{ClockJump, TimeCorrelation};
 use super::two_position::BiasMeasurement;
 use super::version::Shift;
+use crate::paper::page::with_error;
 use crate::telemetry::{Axis, Range};
 use crate::units::MissionTime;
 
@@ -47,7 +48,10 @@ pub(super) fn settling(transients: &[Transient; 2]) -> Vec<Anomaly> {
 pub(super) fn one_sided(found: &OneSided) -> Option<Anomaly> {
     let [from, to] = found.span.filter(|_| found.flew() == Some(true))?;
     let largest = found.offset_counts[0];
-    let [x, y, z] = found.offset_counts;
+    let [x, y, z] = found.offset_counts.map(|[value, sigma]| {
+        let (value, sigma) = with_error(value, sigma);
+        format!("{value} +- {sigma}")
+    });
     Some(Anomaly {
         kind: AnomalyKind::OneSidedTrim,
         from,
@@ -58,9 +62,9 @@ pub(super) fn one_sided(found: &OneSided) -> Option<Anomaly> {
         unit: "counts",
         sentence: format!(
             "The on-board trimmed mean drops one point more at the high end: {} of {} estimates agree bit for bit with that \
-             estimator, {} with the right one. It lowers range C by {:.1} +- {:.1}, {:.1} +- {:.1} and {:.1} +- {:.1} counts (X, Y, Z); the \
-             biases here are measured on the ground and need no correction.",
-            found.flight_exact, found.compared, found.right_exact, x[0], x[1], y[0], y[1], z[0], z[1]
+             estimator, {} with the right one. It lowers range C by {}, {} and {} counts (X, Y, Z); the biases \
+             here are measured on the ground and need no correction.",
+            found.flight_exact, found.compared, found.right_exact, x, y, z
         ),
     })
 }
@@ -76,7 +80,7 @@ pub(super) fn clock_jump(jump: &ClockJump) -> Anomaly {
         sigma: jump.sigma_s,
         unit: "s",
         sentence: format!(
-            "The Orbiter's clock jumped by {:+.3} s against the instrument's; instrument time goes on, and UTC is fitted anew from here.",
+            "The Orbiter's clock jumped by {:+.3} s against the instrument's; instrument time goes on, and the correlation of both is fitted anew from here.",
             jump.jump_s
         ),
     }
