@@ -2,8 +2,8 @@
 //!
 //! The way of a case: [`case`] (read, checked) -> [`scene`] (residual and physics) -> [`noise`] and [`design`] (whitened columns)
 //! -> [`catalogue`] and [`open_form`] (what may be missing) -> [`search`] and [`solve`] (sets, weighed), in [`order`] at the noise
-//! that the record asks for -> [`null_table`] or [`bootstrap`] (how surprising) -> [`trial`] (does it predict) -> [`remains`] and `joint` (what it leaves) -> [`verdict`] with
-//! [`model`] and [`locate`] (what is said) -> [`answer`], [`report`].
+//! that the record asks for -> [`null_table`] or [`bootstrap`] (how surprising) -> [`trial`] (does it predict) -> [`remains`] and
+//! `joint` (what it leaves) -> [`verdict`] with [`model`] and [`locate`] (what is said) -> [`answer`], [`report`].
 
 pub mod analysis;
 pub mod answer;

@@ -116,15 +116,11 @@ pub fn strongest(scene: &Scene, noise: &[AxisNoise; 3], left: &Left) -> Option<R
     };
     let mut found = found_at(*noise);
     found.extend(quiet(noise).into_iter().flat_map(found_at));
-    let weighed = shared_work::map(&found, |(noise, p)| weigh(scene, left_ng, p, noise));
-    let height = |(p, w): (&([AxisNoise; 3], Polynomial), &Option<Weighed>)| {
-        w.as_ref().map_or(f64::NEG_INFINITY, |w| w.log_posterior + p.1.log_prior)
-    };
-    let ((_, best), weighed) =
-        found.iter().zip(&weighed).max_by(|a, b| height((a.0, a.1)).total_cmp(&height((b.0, b.1))))?;
-    let weighed = weighed.as_ref()?;
+    let weighed = shared_work::map(&found, |(noise, p)| Some((p, weigh(scene, left_ng, p, noise)?)));
+    let height = |(p, weighed): &(&Polynomial, Weighed)| weighed.log_posterior + p.log_prior;
+    let (best, weighed) = weighed.into_iter().flatten().max_by(|a, b| height(a).total_cmp(&height(b)))?;
     let nothing = search::height(scene, &frame_of(noise), noise, left_ng).0;
-    told(scene, best, weighed, left_ng, nothing)
+    told(scene, best, &weighed, left_ng, nothing)
 }
 
 /// The best polynomials of each question at the noise of a frame, of all terms up to a level and of one term: the best of all first.
