@@ -116,11 +116,6 @@ impl Service {
         let (ingest_address, http_address) = (address_of(&ingest)?, address_of(&http)?);
         let settings = config.settings.clone();
         let log = Arc::new(RawLog::open(&config.data_dir, &settings.mission, &settings.link)?);
-        if log.batches() == 0 {
-            for held in log.held_for()? {
-                tracing::warn!(held, "the store has no frame of this mission and spacecraft, and some of another");
-            }
-        }
         let station: SharedStation = Arc::new(RwLock::new(Station::new(settings.clone(), None)));
         let samples = Arc::new(StationSamples(station.clone()));
         let queue = config.http.live_queue_messages;
@@ -129,6 +124,9 @@ impl Service {
         if log.batches() == 0 {
             // There is nothing to read again: whoever asks at once is told that there is nothing, and not to wait.
             board.enter(Phase::Running);
+            for held in log.held_for()? {
+                tracing::warn!(held, "the store has no frame of this mission and spacecraft, and some of another");
+            }
         }
         let desk = Arc::new(Desk::default());
         // Read before anybody is answered: what was found before the start is there from the first answer on.

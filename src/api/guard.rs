@@ -1,4 +1,4 @@
-//! What every request passes: its size, and its token where one is configured.
+//! What every request passes: its size, its token where one is configured, whose page it is of where none is, and whether it can be told yet.
 
 use std::collections::HashMap;
 use std::net::IpAddr;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use axum::extract::{Query, Request, State};
 use axum::http::header::{AUTHORIZATION, CONTENT_LENGTH, HOST, ORIGIN, RETRY_AFTER, WWW_AUTHENTICATE};
-use axum::http::{HeaderValue, StatusCode};
+use axum::http::{HeaderValue, StatusCode, Uri};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use sha2::{Digest, Sha256};
@@ -65,16 +65,14 @@ fn refuse(app: &App, request: &Request) -> Option<Response> {
 /// Where no token protects the service, its being on the loopback does; but a browser on this machine would let a page of any site in.
 fn refuse_foreign_page(app: &App, request: &Request) -> Option<Response> {
     let of = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
-    let (_, origin) = of(ORIGIN).filter(|_| app.token.is_none())?.split_once("://")?;
-    let is_here = |authority: &str| {
-        let host = authority
-            .rsplit_once(':')
-            .map_or(authority, |(host, port)| if port.ends_with(']') { authority } else { host });
-        let host = host.trim_start_matches('[').trim_end_matches(']');
-        host.eq_ignore_ascii_case("localhost") || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
-    };
-    let is_own = of(HOST).is_some_and(|host| host.eq_ignore_ascii_case(origin));
-    (!is_here(origin) && !is_own).then(|| {
+    let origin: Uri = of(ORIGIN).filter(|_| app.token.is_none())?.parse().ok()?;
+    // A page that is of no site, as one from a file, says `null`.
+    let origin = origin.scheme().and(origin.authority())?;
+    let host = origin.host().trim_start_matches('[').trim_end_matches(']');
+    let is_here =
+        host.eq_ignore_ascii_case("localhost") || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback());
+    let is_own = of(HOST).is_some_and(|host| host.eq_ignore_ascii_case(origin.as_str()));
+    (!is_here && !is_own).then(|| {
         let detail = format!(
             "a page of {origin} may not read a service that has no token; http.token in its configuration gives it one"
         );

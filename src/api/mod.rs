@@ -110,7 +110,7 @@ fn described(openapi: OpenApi) -> OpenApi {
     let mut openapi = builder.info(info.build()).build();
     let components = openapi.components.get_or_insert_default();
     components.schemas.insert("Problem".into(), problem::Document::schema());
-    let in_query = ApiKey::Query(ApiKeyValue::new("access_token"));
+    let in_query = ApiKey::Query(ApiKeyValue::new(parameters::TOKEN));
     for (name, scheme) in [
         ("bearer", SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer))),
         ("query", SecurityScheme::ApiKey(in_query)),

@@ -14,7 +14,7 @@ use utoipa::openapi::{OpenApi, RefOr};
 use super::problem::Problem;
 
 /// The parameter that every route has: see `guard`.
-const TOKEN: &str = "access_token";
+pub(super) const TOKEN: &str = "access_token";
 
 /// The names of the parameters of every route, as they are described.
 pub struct Parameters(BTreeMap<String, Vec<String>>);

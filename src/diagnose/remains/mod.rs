@@ -126,7 +126,7 @@ pub fn loudness_under(left: &Left, schedule: &Schedule, signal: &Axes) -> f64 {
 }
 
 /// The axis with the largest share in it.
-pub fn mostly(amplitude: [f64; 3]) -> String {
+fn mostly(amplitude: [f64; 3]) -> String {
     let named = ["x", "y", "z"].iter().zip(amplitude);
     format!("mostly {}", named.max_by(|a, b| a.1.total_cmp(&b.1)).map_or("", |(name, _)| *name))
 }
