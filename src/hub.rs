@@ -12,7 +12,7 @@ pub mod status;
 pub mod told;
 pub mod wire;
 
-use std::collections::{BTreeMap, BTreeSet, HashSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, RwLock};
 use std::time::Instant;
 
@@ -170,14 +170,18 @@ impl Hub {
         self.head.send_replace(head_seq);
     }
 
-    /// Everything told whole that the journal still holds.
-    pub fn told_texts(&self) -> HashSet<(Topic, String)> {
+    /// Everything told whole that the journal still holds and that was not taken back, with the clock it is about.
+    pub fn told_texts(&self) -> BTreeMap<(Topic, String), Clock> {
         let state = self.state.read().expect("no holder panics");
-        let told = state.journal.iter().filter_map(|entry| match &**entry {
-            Entry::Told { topic, json, .. } => Some((*topic, json.clone())),
-            _ => None,
-        });
-        told.collect()
+        let mut told = BTreeMap::new();
+        for entry in &state.journal {
+            let Entry::Told { topic, clock, json, .. } = &**entry else { continue };
+            match wire::withdrawn_by(json) {
+                Some(anomaly) => told.remove(&(*topic, anomaly)),
+                None => told.insert((*topic, json.clone()), *clock),
+            };
+        }
+        told
     }
 
     /// A chunk of what was told last, as the store keeps it.

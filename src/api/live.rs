@@ -4,9 +4,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::extract::State;
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{CloseFrame, Message as Frame, Utf8Bytes, WebSocket, WebSocketUpgrade, close_code};
-use axum::http::StatusCode;
-use axum::response::Response;
+use axum::http::header::{CONNECTION, UPGRADE};
+use axum::http::{HeaderMap, HeaderValue, StatusCode};
+use axum::response::{IntoResponse, Response};
 use bytes::Bytes;
 use futures_util::stream::{SplitSink, SplitStream};
 use futures_util::{FutureExt, SinkExt, StreamExt};
@@ -51,11 +53,16 @@ enum From {
 
 /// Live messages over a WebSocket.
 #[utoipa::path(get, path = "/accel/live", tag = "acceleration", params(Wish),
-    responses((status = 101, description = "one JSON object a message: seq, prev, type, ...")))]
+    responses(
+        (status = 101, description = "one JSON object a message: seq, prev, type (hello, lag, window, supersede, gap, raw, calibration, event, \
+            anomaly, anomaly_withdrawn, diagnosis), and the members of that type. anomaly_withdrawn has those of the anomaly that more data take \
+            back, so that what was told and not withdrawn is what /anomalies gives"),
+        (status = 426, description = "the request is none for a WebSocket")))]
 pub async fn live(
     State(app): State<Arc<App>>,
     Asked(wish): Asked<Wish>,
-    upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
+    headers: HeaderMap,
+    upgrade: Result<WebSocketUpgrade, WebSocketUpgradeRejection>,
 ) -> Result<Response, Problem> {
     let words = wish.topics.as_deref().unwrap_or("window");
     let topics = Topics::from_words(words).ok().filter(|topics| *topics != Topics::NONE).ok_or_else(|| {
@@ -77,7 +84,10 @@ pub async fn live(
     {
         return Err(Problem::bad_request(format!("from is seq:{seq}; the last message so far is {head}")));
     }
-    let upgrade = upgrade.map_err(|rejection| Problem::bad_request(rejection.to_string()))?;
+    let upgrade = match upgrade {
+        Ok(upgrade) => upgrade,
+        Err(rejection) => return Ok(no_upgrade(&headers, &rejection)),
+    };
     let permit = app.live_permits.clone().try_acquire_owned().map_err(|_| {
         Problem::new(
             StatusCode::SERVICE_UNAVAILABLE,
@@ -91,6 +101,18 @@ pub async fn live(
         counters.live_clients.fetch_sub(1, std::sync::atomic::Ordering::Relaxed);
         drop(permit);
     }))
+}
+
+/// A request that asks for no WebSocket needs one; one that asks wrongly is a bad one.
+fn no_upgrade(headers: &HeaderMap, rejection: &WebSocketUpgradeRejection) -> Response {
+    if headers.contains_key(UPGRADE) {
+        return Problem::bad_request(rejection.to_string()).into_response();
+    }
+    let detail = "this address speaks WebSocket alone; /accel and /accel/history answer plain requests";
+    let mut response = Problem::new(StatusCode::UPGRADE_REQUIRED, detail).into_response();
+    response.headers_mut().insert(UPGRADE, HeaderValue::from_static("websocket"));
+    response.headers_mut().insert(CONNECTION, HeaderValue::from_static("Upgrade"));
+    response
 }
 
 /// The client is gone, or took nothing for too long.

@@ -331,11 +331,29 @@ pub fn told_event(mission: &MissionTime, event: &Event) -> Body {
 
 /// What is told whole of an anomaly.
 pub fn told_anomaly(mission: &MissionTime, anomaly: &Anomaly) -> Body {
-    Body::Told {
-        topic: Topic::Anomaly,
-        clock: anomaly.from,
-        json: members("anomaly", &AnomalyWire::new(mission, anomaly)),
-    }
+    let json = members("anomaly", &AnomalyWire::new(mission, anomaly));
+    Body::Told { topic: Topic::Anomaly, clock: anomaly.from, json }
+}
+
+/// What takes an anomaly back that was told: the same members but for their type.
+pub fn withdrawn_anomaly(mission: &MissionTime, anomaly: &Anomaly) -> Body {
+    let json = members("anomaly_withdrawn", &AnomalyWire::new(mission, anomaly));
+    Body::Told { topic: Topic::Anomaly, clock: anomaly.from, json }
+}
+
+/// How the members begin that tell of an anomaly.
+const ANOMALY: &str = r#""type":"anomaly","#;
+/// How those begin that take one back.
+const ANOMALY_WITHDRAWN: &str = r#""type":"anomaly_withdrawn","#;
+
+/// The JSON members that take back the anomaly told with these.
+pub fn withdrawal_of(anomaly: &str) -> String {
+    anomaly.replacen(ANOMALY, ANOMALY_WITHDRAWN, 1)
+}
+
+/// The JSON members of the anomaly that these take back, where they take back one.
+pub fn withdrawn_by(members: &str) -> Option<String> {
+    members.strip_prefix(ANOMALY_WITHDRAWN).map(|rest| format!("{ANOMALY}{rest}"))
 }
 
 /// What is told whole of a version of the calibration.

@@ -3,7 +3,7 @@
 //! It runs on a thread of its own. Nothing counts a frame before the raw log holds it. After a restart the log is taken again, and
 //! only what the journal does not hold yet is published.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, RwLock};
 use std::time::{Duration, Instant};
 
@@ -15,7 +15,7 @@ use super::listener::Parts;
 use super::log_replay::{Orphans, take_entry, take_log, taken_again};
 use super::raw_log::{Entry, Journal, JournalPart, RawLog, StoreError};
 use crate::hub::status::{Board, Phase, Picture, count};
-use crate::hub::wire::{Gap, members, told_anomaly, told_calibration, told_event};
+use crate::hub::wire::{Gap, members, told_anomaly, told_calibration, told_event, withdrawal_of, withdrawn_anomaly};
 use crate::hub::{Body, Hub, Journaled, SampleSource, Topic};
 use crate::ingest::wire::playback::PlaybackPart;
 use crate::pipeline::{Change, Station};
@@ -382,16 +382,23 @@ impl Writer {
     }
 
     /// Publishes what a station that has told nothing yet says, but for what was told before; a window is told again only where
-    /// its revision is another one.
+    /// its revision is another one. Of anomalies all that there are now are told, and those told before that there are no longer are
+    /// taken back, whatever the changes say of how it came.
     fn publish_untold(&mut self, mut changes: Vec<Change>) {
         let told = self.hub.told_texts();
-        {
+        let taken_back = {
             let station = self.station.read().expect("no holder panics");
+            let anomalies = &station.derived().anomalies;
+            changes.retain(|change| !matches!(change, Change::Anomaly(_) | Change::AnomalyWithdrawn(_)));
+            changes.extend(anomalies.iter().cloned().map(Change::Anomaly));
             changes.retain(|change| match whole(&station, change) {
-                Some(Body::Told { topic, json, .. }) => !told.contains(&(topic, json)),
+                Some(Body::Told { topic, json, .. }) => !told.contains_key(&(topic, json)),
                 _ => true,
             });
-        }
+            let mission = station.settings().time;
+            taken_back(told, anomalies.iter().map(|anomaly| told_anomaly(&mission, anomaly)))
+        };
+        self.unjournaled.extend(self.hub.publish(taken_back));
         self.publish(changes);
     }
 
@@ -436,6 +443,17 @@ fn body(hub: &Hub, station: &Station, change: Change) -> Option<Body> {
     }
 }
 
+/// What takes back the anomalies that were told and are not among those there are now.
+fn taken_back(mut told: BTreeMap<(Topic, String), Clock>, now: impl Iterator<Item = Body>) -> Vec<Body> {
+    for anomaly in now {
+        if let Body::Told { topic, json, .. } = anomaly {
+            told.remove(&(topic, json));
+        }
+    }
+    let gone = told.into_iter().filter(|((topic, _), _)| *topic == Topic::Anomaly);
+    gone.map(|((topic, json), clock)| Body::Told { topic, clock, json: withdrawal_of(&json) }).collect()
+}
+
 /// What is told whole of a change.
 fn whole(station: &Station, change: &Change) -> Option<Body> {
     let mission = station.settings().time;
@@ -447,6 +465,7 @@ fn whole(station: &Station, change: &Change) -> Option<Body> {
         }
         Change::Event(event) => Some(told_event(&mission, event)),
         Change::Anomaly(anomaly) => Some(told_anomaly(&mission, anomaly)),
+        Change::AnomalyWithdrawn(anomaly) => Some(withdrawn_anomaly(&mission, anomaly)),
         Change::Calibration { .. } => station.calibration().map(told_calibration),
     }
 }

@@ -39,6 +39,8 @@ pub enum Change {
     Event(Event),
     /// Something went wrong with the instrument.
     Anomaly(Anomaly),
+    /// What more data say of an anomaly announced before: it is none, or another one.
+    AnomalyWithdrawn(Anomaly),
     /// A span is not covered.
     Gap {
         /// From this clock.
@@ -349,9 +351,11 @@ impl Station {
             calibration::derive(&self.archive, &self.windows, &self.settings, self.known.as_ref(), Some(&self.derived));
         let changed =
             derived.current() != self.derived.current() || derived.range_corrections != self.derived.range_corrections;
-        for anomaly in derived.anomalies.iter().filter(|anomaly| !self.derived.anomalies.contains(anomaly)) {
-            self.waiting.push(Change::Anomaly(anomaly.clone()));
-        }
+        let (before, now) = (&self.derived.anomalies, &derived.anomalies);
+        let withdrawn = before.iter().filter(|anomaly| !now.contains(anomaly)).cloned();
+        self.waiting.extend(withdrawn.map(Change::AnomalyWithdrawn));
+        let new = now.iter().filter(|anomaly| !before.contains(anomaly)).cloned();
+        self.waiting.extend(new.map(Change::Anomaly));
         if changed && let Some(current) = derived.current() {
             self.waiting.push(Change::Calibration { version: current.version, known_since: current.known_since });
         }

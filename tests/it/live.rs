@@ -3,6 +3,9 @@
 use std::collections::BTreeSet;
 
 use futures_util::{SinkExt, StreamExt};
+use oare_ground::hub::Topics;
+use oare_ground::ingest::wire::LinkConfig;
+use oare_ground::simulate::{Fault, Mission, MissionConfig, recorder};
 use serde_json::Value;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::tungstenite::{Bytes, Message};
@@ -30,7 +33,7 @@ async fn messages_are_numbered_without_holes_and_a_reader_resumes_where_it_was()
     assert_eq!((hello["type"].as_str(), hello["seq"].as_u64()), (Some("hello"), Some(0)));
     running.send(&dump(20_000, 1200, 0)).await;
     let head = running.wait_for_playbacks(1).await["live"]["head_seq"].as_u64().unwrap();
-    let last = running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window,event").unwrap(), head);
+    let last = running.service.hub.last_seq_on(Topics::from_words("window,event").unwrap(), head);
     let mut messages = vec![hello];
     messages.extend(live.through(last).await);
     assert_chain(&messages);
@@ -69,9 +72,7 @@ async fn numbers_last_over_restarts_and_old_messages_can_be_had_again() {
     running.send(&dump(21_200, 600, 2000)).await;
     let next = running.wait_for_playbacks(2).await["live"]["head_seq"].as_u64().unwrap();
     assert!(next > head);
-    let more = live
-        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window,raw").unwrap(), next))
-        .await;
+    let more = live.through(running.service.hub.last_seq_on(Topics::from_words("window,raw").unwrap(), next)).await;
     assert_eq!(more[0]["prev"].as_u64(), again.last().unwrap()["seq"].as_u64(), "the chain goes on after the restart");
 }
 
@@ -85,9 +86,7 @@ async fn history_goes_over_into_live_without_a_hole_or_a_repeat() {
     // More arrives while the history is on its way.
     running.send(&dump(23_000, 3000, 5000)).await;
     let head = running.wait_for_playbacks(2).await["live"]["head_seq"].as_u64().unwrap();
-    let messages = live
-        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), head))
-        .await;
+    let messages = live.through(running.service.hub.last_seq_on(Topics::from_words("window").unwrap(), head)).await;
     assert_chain(&messages);
     let windows = starts(&messages, "window");
     let distinct: BTreeSet<i64> = windows.iter().copied().collect();
@@ -101,7 +100,7 @@ async fn raw_samples_of_the_past_come_too_each_second_once() {
     let running = start().await;
     running.send(&dump(20_000, 900, 0)).await;
     let head = running.wait_for_playbacks(1).await["live"]["head_seq"].as_u64().unwrap();
-    let topics = oare_ground::hub::Topics::from_words("raw,window").unwrap();
+    let topics = Topics::from_words("raw,window").unwrap();
     let mut live = running.live("from=20500&topics=raw,window").await;
     let messages = live.through(running.service.hub.last_seq_on(topics, head)).await;
     assert_chain(&messages);
@@ -126,9 +125,7 @@ async fn a_late_frame_supersedes_the_windows_it_touches_and_no_other() {
     live.next().await.unwrap();
     running.send(late).await;
     let last = running.wait_for_playbacks(2).await["live"]["head_seq"].as_u64().unwrap();
-    let messages = live
-        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), last))
-        .await;
+    let messages = live.through(running.service.hub.last_seq_on(Topics::from_words("window").unwrap(), last)).await;
     assert!(last > head);
     let touched = starts(&messages, "supersede");
     assert!((1..=3).contains(&touched.len()), "{touched:?}");
@@ -155,9 +152,7 @@ async fn a_slow_reader_is_told_what_it_missed() {
     let lag = late.next().await.unwrap();
     assert_eq!(lag["type"], "lag", "{lag}");
     let head = status["live"]["head_seq"].as_u64().unwrap();
-    let messages = late
-        .through(running.service.hub.last_seq_on(oare_ground::hub::Topics::from_words("window").unwrap(), head))
-        .await;
+    let messages = late.through(running.service.hub.last_seq_on(Topics::from_words("window").unwrap(), head)).await;
     assert_eq!(messages[0]["prev"], lag["seq"]);
     assert_chain(&messages);
     let all = status["accel"]["windows"].as_u64().unwrap()
@@ -216,4 +211,63 @@ async fn a_client_is_heard_while_it_catches_up_and_its_leave_is_answered() {
     loud.next().await.unwrap();
     loud.0.send(Message::text("x".repeat(10_000))).await.unwrap();
     assert_eq!(farewell(&mut loud).await.0, Some(Some(CloseCode::Size)));
+}
+
+/// The anomalies that a reader knows who goes by the messages alone.
+fn standing(messages: &[Value]) -> Vec<Value> {
+    let mut standing = Vec::new();
+    for message in messages {
+        let mut anomaly = message.clone();
+        for member in ["seq", "prev", "type"] {
+            anomaly.as_object_mut().unwrap().remove(member);
+        }
+        match message["type"].as_str().unwrap() {
+            "anomaly" => standing.push(anomaly),
+            "anomaly_withdrawn" => {
+                let known = standing.iter().position(|known| *known == anomaly);
+                standing.remove(known.unwrap_or_else(|| panic!("what was not told is withdrawn: {message}")));
+            }
+            _ => {}
+        }
+    }
+    standing.sort_by_key(|anomaly| anomaly["sentence"].to_string());
+    standing
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn anomalies_that_more_data_take_back_are_withdrawn() {
+    let mut config = MissionConfig::sts65(11, 6.0);
+    config.faults.push(Fault::RangeMisreport { from_clock_s: 22_013, seconds: 700 });
+    let frames = recorder::frames(Mission::new(config).unwrap().fly(), LinkConfig::default());
+    let running = start().await;
+    // The end comes down first: what it says of the rest changes with every piece.
+    for (sent, piece) in (1..).zip(frames.chunks(frames.len().div_ceil(12)).rev()) {
+        running.send(&cadus(piece)).await;
+        running.wait_for_playbacks(sent).await;
+    }
+    let told = assert_told_is_what_stands(&running).await;
+    let running = running.restart().await;
+    running.wait_for_playbacks(12).await;
+    assert_eq!(assert_told_is_what_stands(&running).await, told, "a restart tells nothing new");
+}
+
+/// What the messages tell of anomalies is what there is; the messages.
+async fn assert_told_is_what_stands(running: &Running) -> Vec<Value> {
+    let mut there = running.get("/anomalies").await.as_array().unwrap().clone();
+    there.sort_by_key(|anomaly| anomaly["sentence"].to_string());
+    let hub = &running.service.hub;
+    let last = hub.last_seq_on(Topics::from_words("anomaly").unwrap(), hub.head_seq());
+    let messages = running.live("topics=anomaly&from=seq:0").await.through(last).await;
+    assert!(messages.iter().any(|message| message["type"] == "anomaly_withdrawn"), "{messages:#?}");
+    assert!(!there.is_empty());
+    assert_eq!(standing(&messages), there);
+    messages
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_plain_request_is_told_that_a_websocket_is_needed() {
+    let running = start().await;
+    let answer = reqwest::get(running.url("/accel/live")).await.unwrap();
+    assert_eq!(answer.headers()["upgrade"], "websocket");
+    assert_eq!(problem_of(answer).await.0, 426);
 }
