@@ -1,4 +1,5 @@
-//! What every request passes: its size, its token where one is configured, whose page it is of where none is, and whether it can be told yet.
+//! What every request passes: its size, its token where one is configured, and whose page it is of where none is; and what some pass,
+//! whether it can be told yet.
 
 use std::collections::HashMap;
 use std::net::IpAddr;
@@ -22,22 +23,10 @@ const URI_OCTETS_MAX: usize = 8 << 10;
 /// Answered without a token: they tell nothing but that the service is there.
 pub(super) const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
 
-/// Not told while the raw log is being read again: the answer would be that of a part of it, and no one could see that.
-pub(super) const OF_THE_LOG: [&str; 9] = [
-    "/accel",
-    "/accel/history",
-    "/accel/live",
-    "/calibration",
-    "/calibration/history",
-    "/gaps",
-    "/playbacks",
-    "/events",
-    "/anomalies",
-];
 /// After so many seconds a client may ask again.
 const AGAIN_S: &str = "1";
 
-/// Turns away what is too large, has no token or cannot be told yet, and counts what is answered.
+/// Turns away what is too large or has no token, and counts what is answered.
 pub async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
     let response = match refuse(&app, &request) {
         Some(refusal) => refusal,
@@ -58,8 +47,7 @@ fn refuse(app: &App, request: &Request) -> Option<Response> {
         let detail = format!("the body has {octets} octets; {BODY_OCTETS_MAX} at most");
         return Some(Problem::new(StatusCode::PAYLOAD_TOO_LARGE, detail).into_response());
     }
-    let refusals = [refuse_token, refuse_foreign_page, refuse_while_reading];
-    refusals.iter().find_map(|refuse| refuse(app, request))
+    refuse_token(app, request).or_else(|| refuse_foreign_page(app, request))
 }
 
 /// Where no token protects the service, its being on the loopback does; but a browser on this machine would let a page of any site in.
@@ -80,14 +68,15 @@ fn refuse_foreign_page(app: &App, request: &Request) -> Option<Response> {
     })
 }
 
-/// Nothing of the products while they are not all there.
-fn refuse_while_reading(app: &App, request: &Request) -> Option<Response> {
-    (OF_THE_LOG.contains(&request.uri().path()) && app.board.phase() == Phase::Replaying).then(|| {
-        let detail = "the raw log is being read again after a start; what is asked is known when /readyz says so";
-        let mut response = Problem::new(StatusCode::SERVICE_UNAVAILABLE, detail).into_response();
-        response.headers_mut().insert(RETRY_AFTER, HeaderValue::from_static(AGAIN_S));
-        response
-    })
+/// Turns away what is not all there while the raw log is being read again.
+pub async fn refuse_while_reading(State(app): State<Arc<App>>, request: Request, next: Next) -> Response {
+    if app.board.phase() != Phase::Replaying {
+        return next.run(request).await;
+    }
+    let detail = "the raw log is being read again after a start; what is asked is known when /readyz says so";
+    let mut response = Problem::new(StatusCode::SERVICE_UNAVAILABLE, detail).into_response();
+    response.headers_mut().insert(RETRY_AFTER, HeaderValue::from_static(AGAIN_S));
+    response
 }
 
 fn refuse_token(app: &App, request: &Request) -> Option<Response> {

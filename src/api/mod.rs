@@ -13,6 +13,7 @@ mod query;
 mod records;
 mod status;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -68,8 +69,11 @@ pub struct App {
 
 /// Every route.
 pub fn router(app: Arc<App>) -> Router {
-    let (router, openapi) = documented().with_state(app.clone()).split_for_parts();
-    let openapi = Arc::new(described(openapi));
+    let of_the_log = of_the_log();
+    let waits_for_the_log: BTreeSet<String> = of_the_log.get_openapi().paths.paths.keys().cloned().collect();
+    let of_the_log = of_the_log.route_layer(middleware::from_fn_with_state(app.clone(), guard::refuse_while_reading));
+    let (router, openapi) = at_any_time().merge(of_the_log).with_state(app.clone()).split_for_parts();
+    let openapi = Arc::new(described(openapi, &waits_for_the_log));
     let parameters = Arc::new(Parameters::of(&openapi));
     router
         .route("/openapi.json", get(move || async move { Json(OpenApi::clone(&openapi)) }))
@@ -83,7 +87,9 @@ pub fn router(app: Arc<App>) -> Router {
         .layer(middleware::from_fn_with_state(app, guard::guard))
 }
 
-fn documented() -> OpenApiRouter<Arc<App>> {
+/// What the products and the ledger hold: not told while the raw log is being read again, since the answer would be that of a part of
+/// it, and no one could see that.
+fn of_the_log() -> OpenApiRouter<Arc<App>> {
     OpenApiRouter::new()
         .routes(routes!(accel::accel))
         .routes(routes!(accel::history))
@@ -94,6 +100,11 @@ fn documented() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(records::playbacks))
         .routes(routes!(records::events))
         .routes(routes!(records::anomalies))
+}
+
+/// What is told whatever the service is at.
+fn at_any_time() -> OpenApiRouter<Arc<App>> {
+    OpenApiRouter::new()
         .routes(routes!(records::diagnosis))
         .routes(routes!(status::status))
         .routes(routes!(status::healthz))
@@ -101,7 +112,7 @@ fn documented() -> OpenApiRouter<Arc<App>> {
         .routes(routes!(status::metrics_text))
 }
 
-fn described(openapi: OpenApi) -> OpenApi {
+fn described(openapi: OpenApi, waits_for_the_log: &BTreeSet<String>) -> OpenApi {
     let info = InfoBuilder::new()
         .title("oare-ground")
         .version(env!("CARGO_PKG_VERSION"))
@@ -119,14 +130,14 @@ fn described(openapi: OpenApi) -> OpenApi {
     }
     for (path, item) in &mut openapi.paths.paths {
         if let Some(operation) = &mut item.get {
-            describe_problems(path, operation);
+            describe_problems(path, operation, waits_for_the_log.contains(path));
         }
     }
     openapi
 }
 
 /// The problems that any route of its kind may answer with, and what a problem looks like.
-fn describe_problems(path: &str, operation: &mut Operation) {
+fn describe_problems(path: &str, operation: &mut Operation, waits_for_the_log: bool) {
     let needs_token = !guard::OPEN_PATHS.contains(&path);
     let problems = [
         ("400", "a parameter makes no sense, is given twice, or is none of this route", true),
@@ -137,7 +148,7 @@ fn describe_problems(path: &str, operation: &mut Operation) {
         (
             "503",
             "not yet: the raw log is being read again, or as many live clients as are allowed are connected",
-            guard::OF_THE_LOG.contains(&path),
+            waits_for_the_log,
         ),
     ];
     let responses = &mut operation.responses.responses;
