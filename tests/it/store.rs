@@ -398,6 +398,28 @@ fn a_recording_of_a_dump_holds_its_calibrations_events_and_anomalies() {
     assert!(count("/accel/event") > 0);
 }
 
+/// A radius of the table's turn that is written in another unit, or twice what it is, makes every value wrong by as much.
+#[test]
+fn a_scale_factor_that_no_sensor_has_is_told() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("wrong.toml"), "[instrument]\nradius_m = [0.1016, 0.2032, 0.1016]\n").unwrap();
+    let told = |arguments: &[&str]| {
+        let output = oare(&dir, arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let anomalies = std::fs::read(dir.path().join("products/anomalies.json")).unwrap();
+        let anomalies: Vec<serde_json::Value> = serde_json::from_slice(&anomalies).unwrap();
+        let defects = anomalies.into_iter().filter(|anomaly| anomaly["kind"] == "scale_record_defect");
+        defects.collect::<Vec<_>>()
+    };
+    assert!(oare(&dir, &["simulate", "--hours", "24", "--seed", "3", "--out", "a.dump"]).status.success());
+    assert_eq!(told(&["process", "a.dump", "--out", "products"]), Vec::<serde_json::Value>::new());
+    let defects = told(&["process", "a.dump", "--out", "products", "--config", "wrong.toml"]);
+    assert_eq!(defects.len(), 1, "{defects:#?}");
+    assert_eq!(defects[0]["axes"], serde_json::json!(["y"]));
+    assert!(defects[0]["sentence"].as_str().unwrap().contains("radius_m"), "{defects:#?}");
+    assert!((defects[0]["value"].as_f64().unwrap() / 2.0 - 1.0).abs() < 0.3, "{defects:#?}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn an_export_of_another_spacecraft_says_whose_frames_there_are() {
     let running = start().await;

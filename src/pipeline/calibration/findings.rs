@@ -1,8 +1,10 @@
 //! What the calibration's parts found wrong, in words for operators.
 
+use std::ops::RangeInclusive;
+
 use super::anomaly::{Anomaly, AnomalyKind};
 use super::one_sided::OneSided;
-use super::scale_factor::{Refusal, ScaleSequence};
+use super::scale_factor::{Refusal, ScaleMeasurement, ScaleSequence, combine};
 use super::settling::Transient;
 use super::time_correlation::{ClockJump, TimeCorrelation};
 use super::two_position::BiasMeasurement;
@@ -10,6 +12,13 @@ use super::version::Shift;
 use crate::paper::page::with_error;
 use crate::telemetry::{Axis, Range};
 use crate::units::MissionTime;
+
+/// Scale factors of the three axes in flight and on the ground, the extremes [Rice 1996, Table 3], and what is beyond them all by as much
+/// as ground calibrations were by the capacitance of their cables, twice over.
+const PUBLISHED_FACTORS: RangeInclusive<f64> = 1.025..=1.172;
+const PLAUSIBLE_FACTORS: RangeInclusive<f64> = 0.75..=1.5;
+/// Standard errors beyond which a factor is outside.
+const FACTOR_SIGMA: f64 = 6.0;
 
 fn capital(axis: Axis) -> String {
     axis.letter().to_uppercase()
@@ -154,6 +163,35 @@ pub(super) fn scale(sequence: &ScaleSequence) -> Option<Anomaly> {
         sigma,
         unit,
         sentence,
+    })
+}
+
+/// Measured scale factors that no sensor of this make has: what they are made with is wrong.
+pub(super) fn no_scale_factor(axis: Axis, scales: &[(ScaleSequence, Option<ScaleMeasurement>)]) -> Option<Anomaly> {
+    let of_axis: Vec<_> =
+        scales.iter().filter_map(|(s, m)| m.filter(|_| s.axis == axis).map(|m| (s.span, m))).collect();
+    let measured: Vec<ScaleMeasurement> = of_axis.iter().map(|(_, m)| *m).collect();
+    let ScaleMeasurement { correction, sigma } = combine(&measured)?;
+    let told = with_error(correction, sigma);
+    let off = (PLAUSIBLE_FACTORS.start() - correction).max(correction - PLAUSIBLE_FACTORS.end());
+    (off > FACTOR_SIGMA * sigma).then(|| Anomaly {
+        kind: AnomalyKind::ScaleRecordDefect,
+        from: of_axis[0].0[0],
+        to: of_axis[of_axis.len() - 1].0[1],
+        axes: vec![axis],
+        value: correction,
+        sigma,
+        unit: "ratio",
+        sentence: format!(
+            "The scale calibrations of {axis} give a factor of {} +- {}; those published are {} to {}. `instrument.radius_m` or \
+             `instrument.resolution_{}_ng` is wrong, or the table's packets are; the values in ng are by the measured factor.",
+            told.0,
+            told.1,
+            PUBLISHED_FACTORS.start(),
+            PUBLISHED_FACTORS.end(),
+            axis.letter(),
+            axis = capital(axis),
+        ),
     })
 }
 

@@ -257,6 +257,7 @@ fn find_anomalies(archive: &Archive, windows: &Windows, settings: &Settings, der
     anomalies.extend(findings::epoch(&derived.time_correlation, &settings.time));
     let sequences: Vec<ScaleSequence> = derived.scales.iter().map(|(sequence, _)| sequence.clone()).collect();
     anomalies.extend(sequences.iter().filter_map(findings::scale));
+    anomalies.extend(Axis::ALL.iter().filter_map(|axis| findings::no_scale_factor(*axis, &derived.scales)));
     anomalies
         .extend(Axis::ALL.iter().filter_map(|axis| findings::shift(*axis, &derived.shifts[axis.index()], &sequences)));
     anomalies.extend(derived.measurements.iter().filter_map(findings::outlier));
