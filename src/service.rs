@@ -121,7 +121,7 @@ impl Service {
         let queue = config.http.live_queue_messages;
         let hub = Arc::new(Hub::new(&settings.mission, settings.link.spacecraft_id, queue, samples));
         let board = Arc::new(Board::default());
-        if log.batches() == 0 {
+        if log.is_empty()? {
             // There is nothing to read again: whoever asks at once is told that there is nothing, and not to wait.
             board.enter(Phase::Running);
             for held in log.held_for()? {

@@ -70,7 +70,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         return Ok(super::unusable());
     }
     let log = RawLog::open(&args.data, &settings.mission, &settings.link)?;
-    if log.batches() == 0 {
+    if log.is_empty()? {
         let (mission, spacecraft) = (&settings.mission, settings.link.spacecraft_id);
         let held = match log.held_for()? {
             held if held.is_empty() => "it holds none at all".to_string(),

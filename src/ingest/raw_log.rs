@@ -300,7 +300,15 @@ impl RawLog {
         Ok(arrivals.collect())
     }
 
-    /// Batches known to be durable.
+    /// Whether the file has nothing of this mission and spacecraft, replayed or not.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn is_empty(&self) -> Result<bool, StoreError> {
+        Ok(self.batch_octets(0)?.is_none())
+    }
+
+    /// Batches known to be durable: those appended, and of those that were there when it was opened the ones replayed.
     pub fn batches(&self) -> u64 {
         self.batches.load(Ordering::Acquire)
     }

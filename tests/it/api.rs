@@ -150,6 +150,25 @@ async fn while_the_log_is_read_again_products_are_not_told() {
     running.get("/gaps").await;
 }
 
+/// From the first answer after a start on: either all that the log has, or that it is being read.
+#[tokio::test(flavor = "multi_thread")]
+async fn after_a_restart_no_part_of_the_log_is_taken_for_all_of_it() {
+    let running = start().await;
+    running.send(&dump(20_000, 20_000, 0)).await;
+    let durable = running.wait_for_playbacks(1).await["ingest"]["frames_durable"].clone();
+    let running = running.restart().await;
+    loop {
+        let status = running.get("/status").await;
+        match status["phase"].as_str() {
+            Some("replaying") => {}
+            phase => {
+                assert_eq!((phase, &status["ingest"]["frames_durable"]), (Some("running"), &durable));
+                break;
+            }
+        }
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_token_in_a_query_may_stand_as_it_is_or_encoded() {
     let running = start_with(|config| config.http.token = Some("aGVsbG8gd29ybGQ+/3c=".into())).await;

@@ -12,6 +12,7 @@ use oare_ground::ingest::wire::{LinkConfig, PlaybackPart, PlaybackReader};
 use oare_ground::pipeline::{PlaybackId, Settings, station::replay};
 use oare_ground::record::mcap_reader;
 use oare_ground::service::Service;
+use oare_ground::simulate::{Mission, MissionConfig, recorder};
 
 use crate::service_support::*;
 use crate::shared_data;
@@ -418,6 +419,32 @@ fn a_scale_factor_that_no_sensor_has_is_told() {
     assert_eq!(defects[0]["axes"], serde_json::json!(["y"]));
     assert!(defects[0]["sentence"].as_str().unwrap().contains("radius_m"), "{defects:#?}");
     assert!((defects[0]["value"].as_f64().unwrap() / 2.0 - 1.0).abs() < 0.3, "{defects:#?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_export_has_the_products_of_the_service() {
+    let running = start().await;
+    let mission = MissionConfig::sts65(3, 6.0);
+    let frames = recorder::frames(Mission::new(mission).unwrap().fly(), LinkConfig::default());
+    running.send(&cadus(&frames)).await;
+    running.wait_for_playbacks(1).await;
+    let served = running.products();
+    let Running { service, dir } = running;
+    service.drain().await.unwrap();
+    for format in ["csv", "mcap"] {
+        let output = oare(&dir, &["export", "--data", ".", "--format", format, "--out", "out"]);
+        assert!(output.status.success(), "{format}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    let read = |name: &str| std::fs::read(dir.path().join("out").join(name)).unwrap();
+    let text = |name: &str| String::from_utf8(read(name)).unwrap();
+    assert_eq!(text("windows.csv"), served[0]);
+    for (name, served) in ["calibration.json", "anomalies.json"].into_iter().zip(&served[1..]) {
+        let json = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
+        assert_eq!(json(&text(name)), json(served), "{name}");
+    }
+    let recording = read("recording.mcap");
+    let recorded = mcap::MessageStream::new(&recording).unwrap();
+    assert!(recorded.filter(|message| message.as_ref().unwrap().channel.topic == "/accel/window").count() > 400);
 }
 
 #[tokio::test(flavor = "multi_thread")]
