@@ -8,7 +8,6 @@ use super::catalogue::Shape;
 use super::design::{Chosen, Column, Frame, Raw};
 use super::instants::still_warm;
 use super::measure::{coverage, union};
-use super::open_form::orbit_angles;
 use super::scene::{Axes, Scene};
 use super::search::{Entry, Set};
 
@@ -117,7 +116,7 @@ fn covariates(s: &Scene) -> Vec<Covariate> {
     add("the geomagnetic field", s.measure_scalar(|g| s.field_body_t[g].norm()));
     let size = |g: usize| s.simulated_grid_ng.iter().map(|axis| axis[g] * axis[g]).sum::<f64>().sqrt();
     add("the size of the modelled signal", s.measure_scalar(size));
-    let (u, noon) = orbit_angles(s);
+    let (u, noon) = s.orbit_angles_rad();
     for (name, angle) in [("the argument of latitude", &u), ("the angle from orbital noon", &noon)] {
         add(&format!("the sine of {name}"), s.measure_scalar(|g| angle[g].sin()));
         add(&format!("the cosine of {name}"), s.measure_scalar(|g| angle[g].cos()));

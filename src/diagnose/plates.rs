@@ -1,11 +1,10 @@
 //! What the figures of an answer show, window by window. Not here: how it is drawn (`report`).
 
 use super::answer::Diagnosis;
-use super::open_form::orbit_angles;
 use super::report::{CovariatePlate, Plates};
 use super::scene::{Axes, Scene};
 use crate::math::rms::{about_mean, rms_about_mean};
-use crate::physics::{orbit, sun, time};
+use crate::physics::orbit;
 
 /// Panels of covariates, at most.
 const PANELS: usize = 12;
@@ -48,11 +47,10 @@ fn panels(scene: &Scene, model_ng: &Axes) -> Vec<Panel> {
     let grid = |covariates, name: &str, unit: &str, f: &dyn Fn(usize) -> f64| {
         panel(covariates, name, unit, at_windows(scene, f))
     };
-    let (_, past_noon) = orbit_angles(scene);
+    let (_, past_noon) = scene.orbit_angles_rad();
     let zenith = |g: usize| scene.sun[g].dot(&scene.r_m[g].normalize()).clamp(-1.0, 1.0).acos().to_degrees();
-    let ascension = |g: usize| scene.r_m[g].y.atan2(scene.r_m[g].x);
-    let unix_s = |g: usize| scene.case.header.unix_s(scene.grid_s[g]);
-    let local_h = |g: usize| 12.0 + (ascension(g) - sun::right_ascension_rad(unix_s(g))) / HOUR_RAD;
+    let (hour_angle, longitude) = (scene.hour_angle_rad(), scene.longitude_rad());
+    let local_h = |g: usize| 12.0 + hour_angle[g] / HOUR_RAD;
     let radius = |g: usize| scene.r_m[g].norm();
     let state = |g: usize| orbit::State { r_m: scene.r_m[g], v_m_s: scene.v_m_s[g] };
     let pitch = |g: usize| (scene.body[g] * scene.v_m_s[g].normalize()).x.clamp(-1.0, 1.0).acos().to_degrees();
@@ -76,9 +74,7 @@ fn panels(scene: &Scene, model_ng: &Axes) -> Vec<Panel> {
         grid(&["geomagnetic_field"], "geomagnetic field", "uT", &|g| 1e6 * scene.field_body_t[g].norm()),
         grid(&["attitude"], "nose from the velocity", "deg", &pitch),
         grid(&["altitude"], "radius of the orbit", "km", &|g| radius(g) / 1e3),
-        grid(&["longitude"], "longitude", "deg", &|g| {
-            (ascension(g) - time::gmst_rad(unix_s(g))).to_degrees().rem_euclid(360.0)
-        }),
+        grid(&["longitude"], "longitude", "deg", &|g| longitude[g].to_degrees().rem_euclid(360.0)),
         grid(&["latitude"], "latitude", "deg", &|g| (scene.r_m[g].z / radius(g)).clamp(-1.0, 1.0).asin().to_degrees()),
         grid(&["sun_phase"], "angle past orbital noon", "deg", &|g| past_noon[g].to_degrees()),
         panel(&["activity"], &deviation_name(axis), "ng", scene.case.recording.dev_ng[axis].clone()),

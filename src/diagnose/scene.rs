@@ -3,6 +3,8 @@
 //! All here comes from epoch, position, attitude and the log, by the project's own physics; no regressor is read from
 //! the simulation but its signal itself. Not here: which of it explains anything.
 
+mod angles;
+
 use std::ops::Deref;
 use std::sync::Arc;
 

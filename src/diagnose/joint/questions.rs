@@ -1,11 +1,10 @@
 //! What a law may follow together: terms of variables on the ancillary grid, each about one in size, measured as the recording is.
 
 use crate::diagnose::measure::{coverage, relaxing, union};
-use crate::diagnose::open_form::orbit_angles;
 use crate::diagnose::scene::Scene;
 use crate::math::rms::rms_about_mean;
 use crate::math::shared_work;
-use crate::physics::{Vec3, sun, time};
+use crate::physics::{Vec3, time};
 
 /// Terms that are asked together, those of a later level added to those before.
 pub struct Question {
@@ -144,12 +143,8 @@ fn parts(s: &Scene, said: [&str; 3], v: impl Fn(usize) -> Vec3) -> Vec<Variable>
     (0..3).map(|k| Variable::new(said[k], values.iter().map(|v| v[k]).collect())).collect()
 }
 
-fn unix_s(s: &Scene) -> Vec<f64> {
-    s.grid_s.iter().map(|t| s.case.header.unix_s(*t)).collect()
-}
-
 fn place(s: &Scene) -> Vec<Variable> {
-    let unix_s = unix_s(s);
+    let unix_s = s.unix_s();
     parts(s, ["cos(latitude) cos(longitude)", "cos(latitude) sin(longitude)", "sin(latitude)"], |g| {
         let (sin, cos) = time::gmst_rad(unix_s[g]).sin_cos();
         let r = s.r_m[g].normalize();
@@ -205,9 +200,8 @@ fn driving(s: &Scene) -> Vec<Variable> {
 
 /// Angles that go round.
 fn phases(s: &Scene) -> Vec<Variable> {
-    let (u, noon) = orbit_angles(s);
-    let right_ascension = s.r_m.iter().zip(unix_s(s)).map(|(r, t)| r.y.atan2(r.x) - sun::right_ascension_rad(t));
-    let local: Vec<f64> = right_ascension.collect();
+    let (u, noon) = s.orbit_angles_rad();
+    let local = s.hour_angle_rad();
     let circle = |(said, angle): (&str, &Vec<f64>)| {
         let (sines, cosines): (Vec<f64>, Vec<f64>) = angle.iter().map(|a| a.sin_cos()).unzip();
         [Variable::new(format!("sin({said})"), sines), Variable::new(format!("cos({said})"), cosines)]

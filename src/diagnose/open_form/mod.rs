@@ -11,8 +11,6 @@ mod places;
 mod resets;
 mod surroundings;
 
-pub use motion::angles as orbit_angles;
-
 use crate::math::shared_work;
 use crate::physics::Vec3;
 

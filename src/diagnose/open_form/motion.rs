@@ -30,19 +30,6 @@ pub(super) fn rates(c: &mut Collector) {
     c.grid("w.w", "body_rate", place, |g| s.w_rad_s[g].norm_squared());
 }
 
-/// Angles of the orbit at every grid point: argument of latitude, and the angle past orbital noon.
-pub fn angles(scene: &Scene) -> (Vec<f64>, Vec<f64>) {
-    (0..scene.grid_s.len())
-        .map(|g| {
-            let normal = scene.r_m[g].cross(&scene.v_m_s[g]).normalize();
-            let node = Vec3::new(-normal.y, normal.x, 0.0).normalize();
-            let u = scene.r_m[g].dot(&normal.cross(&node)).atan2(scene.r_m[g].dot(&node));
-            let noon = (scene.sun[g] - normal * normal.dot(&scene.sun[g])).normalize();
-            (u, scene.r_m[g].dot(&normal.cross(&noon)).atan2(scene.r_m[g].dot(&noon)))
-        })
-        .unzip()
-}
-
 pub(super) fn lvlh(scene: &Scene, g: usize) -> [Vec3; 3] {
     let normal = scene.r_m[g].cross(&scene.v_m_s[g]).normalize();
     let radial = scene.r_m[g].normalize();
@@ -51,7 +38,7 @@ pub(super) fn lvlh(scene: &Scene, g: usize) -> [Vec3; 3] {
 
 pub(super) fn orbit(c: &mut Collector) {
     let s = c.scene;
-    let (u, noon) = angles(s);
+    let (u, noon) = s.orbit_angles_rad();
     let bodies: [Vec<Vec3>; 3] =
         std::array::from_fn(|k| (0..s.grid_s.len()).map(|g| s.body[g] * lvlh(s, g)[k]).collect());
     let place = "a phase of the orbit";

@@ -1,7 +1,6 @@
 //! Forms that live in one place: within a bump or beyond a threshold of any covariate, and over one region of the Earth.
 
 use super::{AXIS, Collector};
-use crate::physics::{sun, time};
 
 /// Centres of the bumps round a circle.
 const CENTRES: usize = 16;
@@ -16,16 +15,11 @@ pub(super) fn places(c: &mut Collector) {
     thresholds(c);
 }
 
-fn right_ascension_rad(c: &Collector) -> Vec<f64> {
-    c.scene.r_m.iter().map(|r| r.y.atan2(r.x)).collect()
-}
-
 /// A bump at one phase of the orbit, at one angle from orbital noon, at one local time.
 fn circles(c: &mut Collector) {
     let s = c.scene;
-    let (u, noon) = super::motion::angles(s);
-    let sun_rad = |t: &f64| sun::right_ascension_rad(s.case.header.unix_s(*t));
-    let local: Vec<f64> = right_ascension_rad(c).iter().zip(&s.grid_s).map(|(a, t)| a - sun_rad(t)).collect();
+    let (u, noon) = s.orbit_angles_rad();
+    let local = s.hour_angle_rad();
     for (name, covariate, angle) in [
         ("u", "argument_of_latitude", &u),
         ("u - u_noon", "sun_phase", &noon),
@@ -51,11 +45,7 @@ fn circles(c: &mut Collector) {
 /// A push over one region of the Earth.
 fn regions(c: &mut Collector) {
     let s = c.scene;
-    let longitude_deg: Vec<f64> = right_ascension_rad(c)
-        .iter()
-        .zip(&s.grid_s)
-        .map(|(a, t)| (a - time::gmst_rad(s.case.header.unix_s(*t))).to_degrees().rem_euclid(360.0))
-        .collect();
+    let longitude_deg: Vec<f64> = s.longitude_rad().iter().map(|l| l.to_degrees().rem_euclid(360.0)).collect();
     let north: Vec<bool> = s.r_m.iter().map(|r| r.z > 0.0).collect();
     let mut members = Vec::new();
     for (half, wanted) in [("", None), (" of the northern half", Some(true)), (" of the southern half", Some(false))] {

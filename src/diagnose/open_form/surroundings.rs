@@ -1,7 +1,7 @@
 //! Forms of what surrounds the vehicle: sunlight, the geomagnetic field, the air and the place.
 
 use super::{AXIS, Collector};
-use crate::physics::{Vec3, sun, time};
+use crate::physics::Vec3;
 
 pub(super) fn sunlight(c: &mut Collector) {
     let s = c.scene;
@@ -63,12 +63,9 @@ pub(super) fn surroundings(c: &mut Collector) {
     let mean_height = height.iter().sum::<f64>() / height.len() as f64;
     let mean_rho = rho.iter().sum::<f64>() / rho.len() as f64;
     let latitude: Vec<f64> = s.r_m.iter().map(|r| r.z / r.norm()).collect();
-    let unix: Vec<f64> = s.grid_s.iter().map(|t| s.case.header.unix_s(*t)).collect();
-    let ascension: Vec<f64> = s.r_m.iter().map(|r| r.y.atan2(r.x)).collect();
-    let longitude: Vec<f64> = ascension.iter().zip(&unix).map(|(a, t)| a - time::gmst_rad(*t)).collect();
+    let longitude = s.longitude_rad();
     // Twelve hours where the Sun is overhead.
-    let local: Vec<f64> =
-        ascension.iter().zip(&unix).map(|(a, t)| a - sun::right_ascension_rad(*t) + std::f64::consts::PI).collect();
+    let local: Vec<f64> = s.hour_angle_rad().iter().map(|angle| angle + std::f64::consts::PI).collect();
     let mean_s = s.grid_s.iter().sum::<f64>() / s.grid_s.len() as f64;
     let place = "a height, latitude or local time";
     c.grid("rho", "density", place, |g| rho[g]);
