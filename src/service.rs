@@ -138,7 +138,7 @@ impl Service {
         let earlier = diagnosis.as_ref().and_then(|(expected, diagnosis)| {
             let earlier = diagnosing::earlier(&journal.entries, expected, &diagnosis.policy);
             let waiting = || Report::waiting(&expected.header.id, digest(expected, &diagnosis.policy));
-            desk.show(earlier.as_ref().map_or_else(waiting, Report::taken_up));
+            desk.show(earlier.as_ref().map_or_else(waiting, Report::taken_up), 0);
             earlier
         });
         let closing = CancellationToken::new();

@@ -56,7 +56,7 @@ enum From {
     responses(
         (status = 101, description = "one JSON object a message: seq, prev, type (hello, lag, window, supersede, gap, raw, calibration, event, \
             anomaly, anomaly_withdrawn, diagnosis), and the members of that type. anomaly_withdrawn has those of the anomaly that more data take \
-            back, so that what was told and not withdrawn is what /anomalies gives"),
+            back, so that what was told and not withdrawn is what /anomalies gives; diagnosis has those of /diagnosis, of its looks the last alone"),
         (status = 426, description = "the request is none for a WebSocket")))]
 pub async fn live(
     State(app): State<Arc<App>>,

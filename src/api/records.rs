@@ -124,7 +124,7 @@ pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
         name_clock_s, name, alarm_came_at_once, name_came_at_once, alarms_withdrawn, searches_failed, looks"),
         (status = 404, description = "there is none"), (status = 500, description = "the file that lies there is no JSON")))]
 pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Response, Problem> {
-    if let Some(report) = app.desk.report() {
+    if let Some(report) = app.desk.report(&app.hub) {
         return Ok(Json(&*report).into_response());
     }
     let path = app.data_dir.join("diagnosis.json");

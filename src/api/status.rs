@@ -192,7 +192,7 @@ pub async fn status(State(app): State<Arc<App>>) -> Json<Status> {
             delivered: counted(&counters.live_delivered),
             lagged: counted(&counters.live_lagged),
         },
-        diagnosis: app.desk.report().map(|report| DiagnosisStatus::of(&report)),
+        diagnosis: app.desk.report(&app.hub).map(|report| DiagnosisStatus::of(&report)),
     })
 }
 
@@ -285,7 +285,7 @@ fn note(app: &App) {
     gauge!("oare_head_seq").set(app.hub.head_seq() as f64);
     gauge!("oare_ready").set(f64::from(u8::from(app.board.phase() == Phase::Running)));
     gauge!("oare_uptime_seconds").set(app.started.elapsed().as_secs_f64());
-    if let Some(report) = app.desk.report() {
+    if let Some(report) = app.desk.report(&app.hub) {
         note_diagnosis(&report);
     }
 }

@@ -222,8 +222,9 @@ fn print_table(diagnosis: &Diagnosis) {
             _ => format!("excess removed {:.3}", fit.held_out.excess_removed),
         };
         println!(
-            "  held out: log score gain {:.1} +- {:.1}, {removed}",
-            fit.held_out.log_score_gain, fit.held_out.log_score_gain_se
+            "  held out: log score gain {:.1}{}, {removed}",
+            fit.held_out.log_score_gain,
+            fit.held_out.log_score_gain_se.map_or(String::new(), |error| format!(" +- {error:.1}"))
         );
     }
     for note in &diagnosis.notes {

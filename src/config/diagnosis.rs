@@ -105,6 +105,15 @@ impl DiagnosisConfig {
             );
             faults.push(at("case", sentence));
         }
+        // A case of windows need not say when it was; the law of the biases counts from there.
+        let liftoff_s = header.liftoff_clock_s;
+        if liftoff_s != 0.0 && liftoff_s != time.liftoff_clock_s {
+            let sentence = format!(
+                "its liftoff_clock_s is {liftoff_s} and mission.liftoff_clock_s is {}: the biases of one mission have one age",
+                time.liftoff_clock_s
+            );
+            faults.push(at("case", sentence));
+        }
         let files = header.files.clone();
         match Expectation::from_texts(header, &texts) {
             Ok(expectation) if faults.is_empty() => Ok(expectation),

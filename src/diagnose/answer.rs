@@ -292,8 +292,8 @@ pub struct HeldOut {
     /// Gain of the log predictive density, the error of the fitted amplitudes counted. Where the part fitted says nothing of
     /// them it is that of their prior; `excess_removed` is then small.
     pub log_score_gain: f64,
-    /// Its standard error over blocks.
-    pub log_score_gain_se: f64,
+    /// Its standard error over blocks; none where a single block was predicted.
+    pub log_score_gain_se: Option<f64>,
 }
 
 /// A limit.

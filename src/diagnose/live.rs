@@ -35,7 +35,7 @@ use super::verdict::{self, Proof};
 use crate::math::shared_work;
 
 /// Windows that are so many times what is needed for a search came at once: how late a finding is, is then no matter of searches.
-const AT_ONCE: f64 = 2.0;
+const AT_ONCE: f64 = 1.5;
 
 /// When and how to look.
 #[derive(Debug, Clone, PartialEq)]
@@ -188,10 +188,8 @@ impl Live {
         self.sentence = report::sentence(&diagnosis);
         let (verdict, last_clock_s) = (diagnosis.verdict, span_s[1]);
         let named: Vec<String> = diagnosis.effects.iter().map(|e| e.id.clone()).collect();
-        let before = self.answer.as_ref().map_or(0, |answer| answer.windows);
-        let fresh_s = windows.saturating_sub(before) as f64 * WINDOW_STRIDE_S;
-        let due_s = self.policy.search_every_s.max(WINDOWS_MIN as f64 * WINDOW_STRIDE_S);
-        let came_at_once = fresh_s > AT_ONCE * due_s;
+        let known = self.answer.as_ref().map(|answer| (answer.windows, answer.span_s[1]));
+        let came_at_once = came_at_once(known, (windows, last_clock_s), self.policy.search_every_s);
         self.milestones.take(Found { verdict, named: &named, last_clock_s, is_another, came_at_once });
         add(&mut self.looks, Look { windows, last_clock_s, verdict, named, log_odds }, is_another);
         self.answer =
@@ -252,6 +250,18 @@ impl Live {
         let case = self.expected.header.id.clone();
         Report { case, answer: answer.map(|answer| answer.diagnosis.clone()), progress }
     }
+}
+
+/// Whether more windows are new than a look waits for, or most of them lie before the last one that was known: windows, and the centre of
+/// the last, at the look before (none before the first) and now.
+fn came_at_once(known: Option<(usize, f64)>, now: (usize, f64), search_every_s: f64) -> bool {
+    let first_s = WINDOWS_MIN as f64 * WINDOW_STRIDE_S;
+    let (before, due_s, forward_s) = match known {
+        None => (0, search_every_s.max(first_s), f64::INFINITY),
+        Some((windows, last_s)) => (windows, search_every_s, now.1 - last_s),
+    };
+    let fresh_s = now.0.saturating_sub(before) as f64 * WINDOW_STRIDE_S;
+    fresh_s > AT_ONCE * due_s || fresh_s > 2.0 * forward_s
 }
 
 /// Since when what an answer names was there to be found, and what says so.
@@ -322,6 +332,19 @@ mod tests {
         assert_eq!(of(&[&leak, &dump], 2000.0), (CountedFrom::Onset, Some(3000.0)));
         assert_eq!(of(&[&dump, &offset], 200.0), (CountedFrom::FirstData, Some(200.0)), "one of them was always there");
         assert_eq!(of(&[], 200.0), (CountedFrom::FirstData, Some(200.0)));
+    }
+
+    #[test]
+    fn what_comes_at_once_or_after_later_windows_is_a_playback() {
+        let at_once = |known, now| came_at_once(known, now, 3600.0);
+        assert!(!at_once(None, (200, 5000.0)), "as soon as there are enough");
+        assert!(at_once(None, (800, 20_000.0)));
+        let known = Some((800, 100_000.0));
+        assert!(!at_once(known, (944, 103_600.0)), "an hour later");
+        assert!(!at_once(known, (964, 103_600.0)), "and a late piece of the hours before");
+        assert!(at_once(known, (944, 100_000.0)), "an hour before");
+        assert!(at_once(known, (1150, 108_750.0)), "more than a search waits for");
+        assert!(!at_once(known, (800, 100_000.0)), "the same windows once more");
     }
 
     #[test]

@@ -223,16 +223,16 @@ impl<'a> Trial<'a> {
                 }
             }
         }
-        let count = block_gain.len().max(1) as f64;
+        let count = block_gain.len() as f64;
         let mean = block_gain.values().sum::<f64>() / count;
-        let spread = block_gain.values().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+        let spread = block_gain.values().map(|g| (g - mean).powi(2)).sum::<f64>() / (count - 1.0);
         let held = HeldOut {
             scheme: division.scheme.clone(),
             before_rms_ng: std::array::from_fn(|k| rms_about_mean(&self.scene.residual_ng[k])),
             after_rms_ng: std::array::from_fn(|k| rms_about_mean(&after[k])),
             excess_removed: if signal_energy > 0.0 { 1.0 - missed_energy / signal_energy } else { 0.0 },
             log_score_gain: gain,
-            log_score_gain_se: (spread * count).sqrt(),
+            log_score_gain_se: Some((spread * count).sqrt()).filter(|_| count > 1.0),
         };
         let whole = self.frame.with_data(&self.signal).data;
         let is_enough = predictable > 0.0 && predictable >= SHARE * whole.dot(&whole);

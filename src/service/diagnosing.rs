@@ -18,7 +18,7 @@ use super::others;
 use crate::diagnose::case::Expectation;
 use crate::diagnose::live::{Live, News, Policy, Report, State, digest, news};
 use crate::diagnose::recorder;
-use crate::hub::desk::Desk;
+use crate::hub::desk::{Desk, windows_seq};
 use crate::hub::journal::Entry;
 use crate::hub::wire::members;
 use crate::hub::{Body, Hub, Topic};
@@ -63,7 +63,7 @@ impl Diagnosing {
             Ok(live) => live,
             Err(error) => {
                 tracing::error!(%error, "no diagnosis runs: the ancillary data defeat the physics");
-                return desk.show(Report::refused(&case, inputs, error.to_string()));
+                return desk.show(Report::refused(&case, inputs, error.to_string()), 0);
             }
         };
         let pool = match searchers() {
@@ -71,14 +71,15 @@ impl Diagnosing {
             Err(error) => {
                 tracing::error!(%error, "no diagnosis runs: there are no threads for its searches");
                 let sentence = format!("There are no threads for searches: {error}");
-                return desk.show(Report::refused(&case, inputs, sentence));
+                return desk.show(Report::refused(&case, inputs, sentence), 0);
             }
         };
-        let mut teller = Teller { hub: hub.clone(), desk, told: earlier };
+        let mut teller = Teller { hub: hub.clone(), desk, told: earlier, windows_seq: 0 };
         let mut head = hub.subscribe();
         let mut is_coming = true;
         while !stop.is_cancelled() {
             head.mark_unchanged();
+            teller.windows_seq = windows_seq(&hub);
             let seen = recorder::seen(&station.read().expect("no holder panics"), live.span_s());
             teller.tell(live.report(&seen, false));
             if !live.is_due(&seen, is_coming) {
@@ -86,6 +87,7 @@ impl Diagnosing {
                 continue;
             }
             // Of one moment: the windows that are copied are the ones that are counted.
+            teller.windows_seq = windows_seq(&hub);
             let (seen, taken) = {
                 let station = station.read().expect("no holder panics");
                 let seen = recorder::seen(&station, live.span_s());
@@ -120,6 +122,8 @@ struct Teller {
     desk: Arc<Desk>,
     /// What readers of messages know.
     told: Option<Report>,
+    /// Last message about windows before they were counted.
+    windows_seq: u64,
 }
 
 impl Teller {
@@ -130,7 +134,7 @@ impl Teller {
             self.hub.tell(message(&report));
             self.told = Some(report.clone());
         }
-        self.desk.show(report);
+        self.desk.show(report, self.windows_seq);
     }
 }
 

@@ -35,7 +35,8 @@ pub struct Milestones {
     pub name_clock_s: Option<f64>,
     /// The name that stands; empty where there is none.
     pub name: Vec<String>,
-    /// The windows of the look that raised the alarm came down at once, many searches' worth: the time to detect is the playback's.
+    /// The windows of the look that raised the alarm came down at once, more than a search waits for, or after later ones: the time to
+    /// detect is the playback's.
     #[serde(default)]
     pub alarm_came_at_once: bool,
     /// The same of the look that gave the name.
@@ -80,7 +81,7 @@ pub(super) struct Found<'a> {
     pub(super) last_clock_s: f64,
     /// Not the windows of the look before once more.
     pub(super) is_another: bool,
-    /// Many searches' worth of windows was new.
+    /// More windows were new than a search waits for, or they came after later ones.
     pub(super) came_at_once: bool,
 }
 
@@ -238,6 +239,7 @@ impl Report {
     pub fn taken_up(&self) -> Self {
         let mut report = self.clone();
         let progress = &mut report.progress;
+        progress.at_rest = false;
         (progress.state, progress.sentence) = match (&self.answer, progress.state) {
             (None, _) => (State::Collecting, waiting_sentence(0)),
             (Some(_), State::Failed) => (State::Searching, "All windows are searched again.".into()),

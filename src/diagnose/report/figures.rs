@@ -12,6 +12,8 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 const SHADOW: RGBAColor = RGBAColor(70, 90, 130, 0.10);
 /// Mean that a point of a time line stands for, s.
 const LINE_S: f64 = 600.0;
+/// Letters for which there is room beside the ladder's bars.
+const LADDER_LETTERS: usize = 54;
 
 fn hours(plates: &Plates, clock_s: f64) -> f64 {
     (clock_s - plates.liftoff_clock_s) / 3600.0
@@ -45,13 +47,15 @@ type Line<'a> = (RGBColor, u32, &'a [f64], &'static str);
 
 fn timelines<'p>(plates: &'p Plates, lines: impl Fn(usize) -> Vec<Line<'p>>) -> Drawn {
     let (first, last) = range(plates.clock_s.iter().map(|t| hours(plates, *t)));
+    let left = left(plates);
     on_canvas(560, |canvas| {
         let (panels, log) = canvas.split_vertically(470);
         for (axis, panel) in panels.split_evenly((3, 1)).iter().enumerate() {
             let lines = lines(axis);
-            // One scale for a figure and its sequel: that of the residual before.
+            // One scale for a figure and its sequel: that of the residual before or after, whichever is the larger.
             let smooth = |y: &[f64]| runs(&plates.clock_s, y, LINE_S);
-            let high = smooth(&plates.before_ng[axis]).iter().flatten().map(|p| p.1.abs()).fold(1.0, f64::max) * 1.15;
+            let peak = |y: &[f64]| smooth(y).iter().flatten().map(|p| p.1.abs()).fold(1.0, f64::max);
+            let high = peak(&plates.before_ng[axis]).max(peak(&left[axis])) * 1.15;
             let mut chart = ChartBuilder::on(panel)
                 .margin_top(8)
                 .margin_right(14)
@@ -212,7 +216,8 @@ pub fn spectrum(plates: &Plates) -> Drawn {
         for (axis, panel) in canvas.split_evenly((3, 1)).iter().enumerate() {
             let of = |y: &[f64]| amplitudes(&plates.clock_s, y, plates.period_s, &cycles);
             let before = of(&plates.before_ng[axis]);
-            let high = before.iter().copied().fold(1.0, f64::max) * 1.1;
+            let after = claimed.then(|| of(&left[axis]));
+            let high = before.iter().chain(after.iter().flatten()).copied().fold(1.0, f64::max) * 1.1;
             let bottom = axis == 2;
             let mut chart = ChartBuilder::on(panel)
                 .margin_top(8)
@@ -229,12 +234,20 @@ pub fn spectrum(plates: &Plates) -> Drawn {
             mesh.y_label_formatter(&|y| format!("{y:.0}")).draw().map_err(said)?;
             let line = |y: &[f64]| cycles.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
             chart.draw_series(LineSeries::new(line(&before), GREY.stroke_width(1))).map_err(said)?;
-            if claimed {
-                chart.draw_series(LineSeries::new(line(&of(&left[axis])), BLUE.stroke_width(2))).map_err(said)?;
+            if let Some(after) = after {
+                chart.draw_series(LineSeries::new(line(&after), BLUE.stroke_width(2))).map_err(said)?;
             }
         }
         Ok(())
     })
+}
+
+/// A name as far as there is room for it beside the bars.
+fn shortened(name: &str) -> String {
+    match name.char_indices().nth(LADDER_LETTERS) {
+        Some((end, _)) => format!("{}…", name[..end].trim_end()),
+        None => name.to_string(),
+    }
 }
 
 /// Log evidence of the sets against nothing, as bars.
@@ -267,7 +280,7 @@ pub fn ladder(plates: &Plates) -> Drawn {
             let bar = Rectangle::new([(0.0, row + 0.25), (*evidence, row + 0.75)], colour.filled());
             chart.draw_series([bar]).map_err(said)?;
             let y = 4 + (26.0 * k as f64 + 6.0) as i32;
-            canvas.draw(&Text::new(name.replace('_', " "), (4, y), text(11))).map_err(said)?;
+            canvas.draw(&Text::new(shortened(&name.replace('_', " ")), (4, y), text(11))).map_err(said)?;
             let x = chart.backend_coord(&(evidence.max(0.0), row)).0;
             canvas.draw(&Text::new(format!("{evidence:.1}"), (x + 6, y), text(12))).map_err(said)?;
         }

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::Plates;
 use super::sentence::{sentence, short};
-use crate::diagnose::answer::{Diagnosis, EffectAnswer, Verdict};
+use crate::diagnose::answer::{Diagnosis, EffectAnswer, HeldOut, Verdict};
 use crate::paper::Figures;
 use crate::paper::page::{close, escaped, figure, open, table, with_error, words};
 
@@ -127,6 +127,12 @@ fn rms(effect: &EffectAnswer) -> String {
         .map_or(String::new(), |[x, y, z]| format!(", {}, {} and {} ng rms on x, y, z", short(x), short(y), short(z)))
 }
 
+/// What the log score gains on data not seen, with its error where there is one.
+fn gain(held: &HeldOut) -> String {
+    let error = held.log_score_gain_se.map_or(String::new(), |error| format!(" ± {}", short(error)));
+    short(held.log_score_gain) + &error
+}
+
 fn held_out(page: &mut String, d: &Diagnosis) {
     let Some(fit) = &d.fit else { return };
     page.push_str("<h2>Does it predict?</h2>\n");
@@ -149,17 +155,18 @@ fn held_out(page: &mut String, d: &Diagnosis) {
         ],
     );
     let claimed = !d.effects.is_empty();
-    let removed = if claimed {
-        format!("a fit to the other blocks gives {:.0} % of the effect; ", 100.0 * fit.held_out.excess_removed)
-    } else {
-        String::new()
+    let removed = match fit.confirmed {
+        _ if !claimed => String::new(),
+        Some(_) => {
+            format!("a fit to the other blocks gives {:.0} % of the effect; ", 100.0 * fit.held_out.excess_removed)
+        }
+        None => "the other blocks do not say how large the effect is; ".into(),
     };
     let _ = writeln!(
         page,
-        "<p>Held out: {}. {removed}log score gained {} ± {}.</p>",
+        "<p>Held out: {}. {removed}log score gained {}.</p>",
         escaped(&fit.held_out.scheme),
-        short(fit.held_out.log_score_gain),
-        short(fit.held_out.log_score_gain_se)
+        gain(&fit.held_out)
     );
     if let Some(share) = fit.confirmed {
         let _ = writeln!(
@@ -175,13 +182,7 @@ fn held_out(page: &mut String, d: &Diagnosis) {
             "<p>Attitudes ({scheme}): what is left in does not say how large this is in what is left out.</p>"
         );
     } else if let Some(held) = &fit.left_out_attitudes {
-        let _ = writeln!(
-            page,
-            "<p>Attitudes: {}; log score gained {} ± {}.</p>",
-            escaped(&held.scheme),
-            short(held.log_score_gain),
-            short(held.log_score_gain_se)
-        );
+        let _ = writeln!(page, "<p>Attitudes: {}; log score gained {}.</p>", escaped(&held.scheme), gain(held));
     }
     if let Some(above) = fit.above_placebo {
         let _ = writeln!(

@@ -45,7 +45,7 @@ fn diagnosis(verdict: Verdict) -> Diagnosis {
                 after_rms_ng: [40.3, 30.1, 35.4],
                 excess_removed: 0.985,
                 log_score_gain: 118.2,
-                log_score_gain_se: 15.0,
+                log_score_gain_se: Some(15.0),
             },
             left_out_attitudes: None,
             above_placebo: Some(12.0),

@@ -87,7 +87,7 @@ mod tests {
             after_rms_ng: [50.0; 3],
             excess_removed: 0.9,
             log_score_gain,
-            log_score_gain_se: 5.0,
+            log_score_gain_se: Some(5.0),
         }
     }
 
