@@ -11,6 +11,9 @@ use crate::math::rms::rms_about_mean;
 /// A remaining autocorrelation this unlikely makes the errors wider.
 const WHITENESS_P: f64 = 1e-3;
 
+/// Errors that all windows share are told from this share of the noise on.
+const SHARED_TOLD: f64 = 0.25;
+
 /// Before and after, and by how much the errors must be widened.
 pub fn fit(
     scene: &Scene,
@@ -50,6 +53,7 @@ pub fn fit(
             tried.blocks.scheme, tried.blocks.excess_removed
         ));
     }
+    notes.extend(of_shared_errors(scene, frame, weighed, &left));
     let fit = Fit {
         noise_floor_ng: std::array::from_fn(|k| weighed.noise[k].rms_ng()),
         before: level(&scene.residual_ng, &before, 0.0),
@@ -60,6 +64,23 @@ pub fn fit(
         above_placebo: tried.above_placebo,
     };
     (fit, inflation)
+}
+
+/// Says how much of what is left the calibration's own errors account for, which all windows share: it shows in the plots, and is no physics.
+fn of_shared_errors(scene: &Scene, frame: &Frame, weighed: &Weighed, left_ng: &Axes) -> Vec<String> {
+    let without = frame.less_shared_errors(left_ng, &scene.schedule.shared_ng);
+    let told = |k: usize| {
+        let shared: Vec<f64> = left_ng[k].iter().zip(&without[k]).map(|(left, without)| left - without).collect();
+        let rms_ng = rms_about_mean(&shared);
+        (rms_ng > SHARED_TOLD * weighed.noise[k].rms_ng()).then(|| {
+            format!(
+                "of what remains of axis {}, {rms_ng:.0} ng rms is taken for errors of the calibration that all windows share, as large as its \
+                 covariance allows, and for no physics",
+                ["x", "y", "z"][k]
+            )
+        })
+    };
+    (0..3).filter_map(told).collect()
 }
 
 /// Ljung-Box over twenty lags: its p value, and the statistic against what is expected.
