@@ -19,7 +19,8 @@ use super::output::{write, write_report};
 /// Says what physics a simulation left out, from a case directory.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Directory with `case.toml` and the files it names.
+    /// Directory with `case.toml` and the files it names, or that `case.toml`.
+    #[arg(value_parser = case_directory)]
     case: PathBuf,
     /// Where `diagnosis.json` goes; no file of the case is written over.
     #[arg(long)]
@@ -169,6 +170,13 @@ fn analyse(args: &Args) -> Result<Analysis, CaseError> {
     let reached = (args.bootstraps > 0).then(|| prepared.bootstrap().run(args.bootstraps, || bar.inc(1)));
     bar.finish_and_clear();
     Ok(prepared.conclude(reached))
+}
+
+/// A case goes by its directory, or by the file in it that makes it one.
+fn case_directory(text: &str) -> Result<PathBuf, std::convert::Infallible> {
+    let path = Path::new(text);
+    let is_the_file = path.file_name().is_some_and(|name| name == "case.toml") && path.is_file();
+    Ok(path.parent().filter(|_| is_the_file).map_or(path.into(), |directory| Path::new(".").join(directory)))
 }
 
 fn effect(text: &str) -> Result<String, String> {

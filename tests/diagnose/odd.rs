@@ -127,11 +127,12 @@ fn no_file_of_the_case_is_written_over() {
     }
     let recording = folder.path().join("recording.csv");
     let before = std::fs::read(&recording).unwrap();
-    let run = |option: &str, to: &std::path::Path| {
+    let run_of = |case: &std::path::Path, option: &str, to: &std::path::Path| {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_oare"));
-        let output = command.arg("diagnose").arg(folder.path()).arg(option).arg(to).output().unwrap();
+        let output = command.arg("diagnose").arg(case).arg(option).arg(to).output().unwrap();
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
     };
+    let run = |option: &str, to: &std::path::Path| run_of(folder.path(), option, to);
     let refused = |option: &str, to: &std::path::Path, why: &str| {
         let (code, said) = run(option, to);
         assert!(code == Some(2) && said.contains(why), "{option} {}: {code:?} {said}", to.display());
@@ -145,6 +146,11 @@ fn no_file_of_the_case_is_written_over() {
     std::fs::write(&other, "{}").unwrap();
     refused("--out", &other, "a file of the case");
     assert_eq!([run("--out", &answer).0, run("--out", &answer).0], [Some(0); 2]);
+    // A case is its directory, or the file in it that makes it one.
+    let (answered, case) = (std::fs::read(&answer).unwrap(), folder.path().join("case.toml"));
+    assert_eq!(run_of(&case, "--out", &answer).0, Some(0));
+    assert_eq!(std::fs::read(&answer).unwrap(), answered);
+    assert!(run_of(&case, "--out", &recording).1.contains("a file of the case"));
 }
 
 #[test]
