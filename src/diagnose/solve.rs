@@ -27,6 +27,10 @@ const QUIET_TAU_S: f64 = 3000.0;
 const SHARP: f64 = 150.0;
 const SHARP_MAX: usize = 3;
 
+/// Log score below the best at one noise up to which a set is weighed whatever the next noise makes of it, and how many such sets.
+const ALONG: f64 = 6.0;
+const ALONG_MAX: usize = 3;
+
 /// Log posterior by which a null's noise must be improved upon for the search to begin again from there, and searches at most.
 const MISSED: f64 = 3.0;
 const SEARCHES_MAX: usize = 4;
@@ -196,6 +200,9 @@ struct Pool {
     noise: [AxisNoise; 3],
     listed: Vec<Set>,
     opens: Vec<Set>,
+    /// Listed sets that were among the best at a noise before: what is next to the best there may be the best with a noise of its own, and
+    /// out of reach from that of another.
+    before: Vec<Set>,
 }
 
 impl Pool {
@@ -240,20 +247,28 @@ impl Pool {
         joined.retain(|s| library.is_open(s));
         opens.extend(joined.into_iter().take(4));
         search::distinct(&mut opens);
-        Some(Self { noise, listed, opens })
+        Some(Self { noise, listed, opens, before: Vec::new() })
     }
 
     fn top(&self) -> Option<&Set> {
         [self.listed.first(), self.opens.first()].into_iter().flatten().max_by(|a, b| a.score.total_cmp(&b.score))
     }
 
+    /// Listed sets that go along to the next noise.
+    fn near_the_best(&self) -> Vec<Set> {
+        let top = self.listed.first().map_or(0.0, |s| s.score);
+        self.listed.iter().filter(|s| s.score > top - ALONG).take(ALONG_MAX).cloned().collect()
+    }
+
     /// The best of each kind, each weighed with its own noise, best first.
     fn weigh(self, scene: &Scene, entries: &[Entry], count: [usize; 2], stop: Stop) -> Option<Kinds> {
-        let weigh = |sets: Vec<Set>, count: usize| -> Option<Vec<Weighed>> {
+        let weigh = |sets: Vec<Set>, count: usize, before: &[Set]| -> Option<Vec<Weighed>> {
             let top = sets.first().map_or(0.0, |s| s.score);
             let worth = top > WORTH_A_REFIT;
             let near = sets.into_iter().filter(|s| s.score > top - 14.0).collect();
-            let keep = varied(near, if worth { count } else { 1 });
+            let mut keep = varied(near, if worth { count } else { 1 });
+            keep.extend(before.iter().cloned());
+            search::retain_first(&mut keep, Set::key);
             let rounds = if worth { 2 } else { 1 };
             let mut weighed = shared_work::map(&keep, |s| {
                 (!stop()).then(|| search::weigh_with_own_noise(scene, entries, s, &self.noise, rounds, 40))
@@ -263,7 +278,8 @@ impl Pool {
             weighed.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
             Some(weighed)
         };
-        let (listed, open) = shared_work::both(|| weigh(self.listed, count[0]), || weigh(self.opens, count[1]));
+        let (listed, open) =
+            shared_work::both(|| weigh(self.listed, count[0], &self.before), || weigh(self.opens, count[1], &[]));
         Some((listed?, open?))
     }
 }
@@ -303,6 +319,7 @@ fn converged(scene: &Scene, library: &Library, noise_null: &[AxisNoise; 3], stop
     let mut noise = *noise_null;
     let mut best_key = Vec::new();
     let mut alone = Alone::default();
+    let mut before: Vec<Set> = Vec::new();
     for round in 0.. {
         let frame = Frame::new(&noise, &scene.schedule, &scene.loudness, &scene.residual_ng);
         let bank = Bank::new(&frame, entries);
@@ -321,8 +338,9 @@ fn converged(scene: &Scene, library: &Library, noise_null: &[AxisNoise; 3], stop
         }
         let pool = Pool::found(scene, library, &frame, &seen, noise, stop)?;
         let again = pool.top().filter(|top| top.score >= WORTH_A_REFIT && round < 2 && top.key() != best_key);
-        let Some(top) = again else { return Some((pool, alone)) };
+        let Some(top) = again else { return Some((Pool { before, ..pool }, alone)) };
         best_key = top.key();
+        before.extend(pool.near_the_best());
         noise = search::weigh_with_own_noise(scene, entries, top, &noise, 2, 50).noise;
     }
     unreachable!("the rounds end by their number")

@@ -100,14 +100,9 @@ impl Grid {
         })
     }
 
-    /// How loud a spectrum is about one of its lines beside that of white noise, 1 at least.
+    /// How loud a spectrum is about one of its lines beside that of white noise, 1 at least: from the median of the lines about it, from a
+    /// half of its frequency to one and a half, which no single line moves, and as far as they are enough to say so.
     pub fn loudness(&self, spectrum: &[Complex64], m: usize) -> f64 {
-        self.beside_white(spectrum, m).max(1.0)
-    }
-
-    /// The same, louder or quieter: from the median of the lines about it, from a half of its frequency to one and a half, which no single
-    /// line moves, and as far as they are enough to say so.
-    fn beside_white(&self, spectrum: &[Complex64], m: usize) -> f64 {
         let reach = LINES_ABOUT.max(m / 2);
         let about = m.saturating_sub(reach).max(1)..(m + reach + 1).min(spectrum.len());
         let mut power: Vec<f64> = spectrum[about].iter().map(Complex64::norm_sqr).collect();
@@ -115,11 +110,10 @@ impl Grid {
         let excess = (middle / LN_2).ln();
         // Variance of the logarithm of a median of exponential numbers, as many as the windows fill of the grid.
         let variance = self.length() as f64 / (self.windows * power.len() as f64 * LN_2.powi(2));
-        (excess * EXCESS.powi(2) / (EXCESS.powi(2) + variance)).exp()
+        (excess * EXCESS.powi(2) / (EXCESS.powi(2) + variance)).exp().max(1.0)
     }
 
-    /// How loud what is on the grid is beside white noise, 1 at least: a mean over all lines and axes with the power that `signal` has there,
-    /// in which louder and quieter ones, which are as many by chance, weigh the same.
+    /// How loud what is on the grid is beside white noise, a mean over all lines and axes with the power that `signal` has there.
     pub fn loudness_under(&self, clock_s: &[f64], signal: &Axes) -> f64 {
         let (mut louder, mut all) = (0.0, 0.0);
         for (spectrum, series) in self.spectra(0.0).iter().zip(signal) {
@@ -129,12 +123,12 @@ impl Grid {
             while m < self.length() / 2 {
                 let next = (m + 1 + m / BANDS).min(self.length() / 2);
                 let power: f64 = transform[m..next].iter().map(Complex64::norm_sqr).sum();
-                louder += power * self.beside_white(spectrum, m);
+                louder += power * self.loudness(spectrum, m);
                 all += power;
                 m = next;
             }
         }
-        if all > 0.0 { (louder / all).max(1.0) } else { 1.0 }
+        if all > 0.0 { louder / all } else { 1.0 }
     }
 
     /// The part from a place on, under a taper: such lines of its spectra, by a transform of at least the taper's length. `None` where nothing
