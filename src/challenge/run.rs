@@ -98,6 +98,9 @@ pub fn run_open(directory: &Path, analyser: &dyn Analyser, progress: &ProgressBa
         .filter_map(|entry| entry.ok().map(|e| e.path()))
         .filter(|path| path.join("truth.json").is_file())
         .collect();
+    if cases.is_empty() {
+        return Err(io::Error::new(io::ErrorKind::NotFound, "none has its truth.json with it"));
+    }
     cases.sort();
     progress.set_length(cases.len() as u64);
     let outcomes = Mutex::new(Vec::new());

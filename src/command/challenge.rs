@@ -30,8 +30,8 @@ pub struct Args {
     #[arg(long, value_enum, value_delimiter = ',')]
     kinds: Vec<Kind>,
     /// Only this effect of the catalogue, or this unlisted law.
-    #[arg(long)]
-    effect: Option<String>,
+    #[arg(long, value_parser = known)]
+    effect: Option<&'static str>,
     /// Winds, density waves and panel areas that the analyser's regressors do not have.
     #[arg(long)]
     other_physics: bool,
@@ -82,10 +82,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let outcomes = match &args.open {
         Some(directory) => {
             let progress = bar(0, "analysing");
-            let outcomes = run::run_open(directory, &engine, &progress)
-                .with_context(|| format!("cannot read the cases of {}", directory.display()))?;
+            let outcomes = run::run_open(directory, &engine, &progress);
             progress.finish_and_clear();
-            outcomes
+            match outcomes {
+                Ok(outcomes) => outcomes,
+                Err(error) => {
+                    eprintln!("oare challenge: cannot use the cases of {}: {error}", directory.display());
+                    return Ok(super::unusable());
+                }
+            }
         }
         None => match concealed(&args, &engine)? {
             Some(outcomes) => outcomes,
@@ -106,7 +111,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// Seals, perhaps writes, analyses; nothing to score when the cases were only to be made.
 fn concealed(args: &Args, engine: &Engine) -> anyhow::Result<Option<Vec<Outcome>>> {
-    let only = args.effect.as_deref().map(known).transpose()?;
+    let only = args.effect;
     let kinds = match (args.kinds.is_empty(), only) {
         (false, _) => args.kinds.clone(),
         (true, None) => Kind::ALL.to_vec(),
@@ -148,10 +153,10 @@ fn keep(out: &Path, outcomes: &[Outcome]) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn known(id: &str) -> anyhow::Result<&'static str> {
+fn known(id: &str) -> Result<&'static str, String> {
     let all = || effect::IDS.into_iter().chain(law::all().map(|(name, _)| name));
     let there = || all().collect::<Vec<&str>>().join(", ");
-    all().find(|known| *known == id).with_context(|| format!("no effect or law `{id}`; there are: {}", there()))
+    all().find(|known| *known == id).ok_or_else(|| format!("no such effect or law; there are: {}", there()))
 }
 
 pub(super) fn bar(length: usize, doing: &'static str) -> ProgressBar {

@@ -14,7 +14,7 @@ use oare_ground::diagnose::measured::{self, MeasuredCase};
 use oare_ground::diagnose::report;
 use oare_ground::paper::page::with_error;
 
-use super::output::{write, write_report};
+use super::output::{is_one_file, write, write_report};
 
 /// Says what physics a simulation left out, from a case directory.
 #[derive(clap::Args)]
@@ -106,12 +106,32 @@ fn misplaced(args: &Args) -> Option<String> {
         if out.is_dir() {
             return Some(format!("--out {}: expected a file, found a folder", out.display()));
         }
-        if out.canonicalize().is_ok_and(|out| out.starts_with(&case)) && !is_answer(out) {
+        let is_inside = out.canonicalize().is_ok_and(|out| out.starts_with(&case));
+        let is_named = || named_files(args).iter().any(|file| is_one_file(file, out));
+        if (is_inside || is_named()) && !is_answer(out) {
             return Some(format!("--out {}: that is a file of the case, and is not written over", out.display()));
         }
     }
     let report = args.report.as_ref().filter(|report| report.canonicalize().is_ok_and(|report| report == case))?;
     Some(format!("--report {}: that is the case itself, and is not written to", report.display()))
+}
+
+/// Everything that `case.toml` or an override may name as a file, wherever it lies.
+fn named_files(args: &Args) -> Vec<PathBuf> {
+    fn texts(value: &toml::Value, found: &mut Vec<String>) {
+        match value {
+            toml::Value::String(text) => found.push(text.clone()),
+            toml::Value::Array(values) => values.iter().for_each(|value| texts(value, found)),
+            toml::Value::Table(table) => table.values().for_each(|value| texts(value, found)),
+            _ => {}
+        }
+    }
+    let text = std::fs::read_to_string(args.case.join("case.toml")).unwrap_or_default();
+    let mut found = Vec::new();
+    texts(&toml::Value::Table(text.parse().unwrap_or_default()), &mut found);
+    found
+        .extend(args.set.iter().filter_map(|set| set.split_once('=')).map(|(_, value)| value.trim_matches('"').into()));
+    found.iter().map(|name| args.case.join(name)).collect()
 }
 
 /// Whether a file is an earlier answer.

@@ -6,6 +6,11 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use oare_ground::paper::Report;
 
+/// Whether two paths lead to one file that is there.
+pub fn is_one_file(a: &Path, b: &Path) -> bool {
+    a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
+}
+
 /// Writes a file; its folder is made if need be.
 pub fn write(path: &Path, text: &str) -> Result<()> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {

@@ -6,6 +6,8 @@ use std::process::ExitCode;
 use anyhow::Context;
 use oare_ground::ingest::wire::Pad;
 
+use super::output::is_one_file;
+
 /// A PAD file of the space station's archive: what it holds, and as CSV.
 #[derive(clap::Args)]
 pub struct Args {
@@ -40,6 +42,10 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         println!("{axis}  mean {:+10.2} ug  rms about it {:9.2} ug", mean * 1e6, rms * 1e6);
     }
     if let Some(out) = &args.csv {
+        if is_one_file(out, &args.file) {
+            eprintln!("oare: --csv {}: that is the PAD file itself, and is not written over", out.display());
+            return Ok(super::unusable());
+        }
         std::fs::write(out, pad.csv()).with_context(|| format!("cannot write {}", out.display()))?;
     }
     Ok(super::DONE)

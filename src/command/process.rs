@@ -1,5 +1,6 @@
 //! `oare process`: dumps in, product files out; the same pipeline as the service, without sockets.
 
+use std::cell::Cell;
 use std::collections::HashSet;
 use std::fs;
 use std::io::BufWriter;
@@ -78,7 +79,11 @@ pub fn run(args: Args) -> Result<ExitCode> {
         let report = report(&station);
         write_report(folder, &report.paper, ("accuracy.json", &pretty(&report.accuracy)?))?;
     }
-    let whole = streams.iter().all(|stream| stream.whole);
+    for (path, stream) in args.files.iter().zip(&streams).filter(|(_, stream)| stream.frames.get() == 0) {
+        let (file, octets) = (path.display(), stream.octets.len());
+        eprintln!("oare process: {file}: no frame in {octets} octets; it adds nothing");
+    }
+    let whole = streams.iter().all(|stream| stream.whole && stream.frames.get() > 0);
     Ok(if summarise(&station, args.json)? && whole { super::DONE } else { super::done_in_part() })
 }
 
@@ -91,6 +96,8 @@ fn read_calibration(path: &Path) -> Result<KnownCalibration> {
 struct Stream {
     link: LinkConfig,
     octets: Vec<u8>,
+    /// Frames found in it, good or not.
+    frames: Cell<u64>,
     /// Not a recording that was cut off or damaged.
     whole: bool,
 }
@@ -99,12 +106,12 @@ struct Stream {
 fn read_stream(path: &Path, link: LinkConfig) -> Result<Stream> {
     let octets = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     if !mcap_reader::is_mcap(&octets) {
-        return Ok(Stream { link, octets, whole: true });
+        return Ok(Stream { link, octets, frames: Cell::new(0), whole: true });
     }
     let link = LinkConfig { randomised: false, reed_solomon_interleave: None, ..link };
     let recorded = mcap_reader::dump(&octets, &link).with_context(|| format!("cannot use {}", path.display()))?;
     recorded.faults.iter().for_each(|fault| eprintln!("oare process: {}: {fault}", path.display()));
-    Ok(Stream { link, octets: recorded.dump, whole: recorded.faults.is_empty() })
+    Ok(Stream { link, octets: recorded.dump, frames: Cell::new(0), whole: recorded.faults.is_empty() })
 }
 
 /// Reads every stream; parts come with the number of their playback.
@@ -114,6 +121,7 @@ fn read_all(streams: &[Stream], mut hand_on: impl FnMut(u32, PlaybackPart)) {
         let mut reader = PlaybackReader::new(stream.link);
         let mut number = |part: PlaybackPart| {
             playback += u32::from(part == PlaybackPart::Opened);
+            stream.frames.set(stream.frames.get() + u64::from(matches!(part, PlaybackPart::Arrival(_))));
             hand_on(playback, part);
         };
         stream.octets.chunks(1 << 16).for_each(|chunk| reader.push(chunk, &mut number));

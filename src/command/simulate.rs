@@ -40,8 +40,21 @@ pub struct Args {
 
 /// Flies the mission.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if args.truth.as_ref() == Some(&args.out) {
+        eprintln!(
+            "oare simulate: --out and --truth are both {}: one would be written over the other",
+            args.out.display()
+        );
+        return Ok(super::unusable());
+    }
     let text = match &args.config {
-        Some(path) => fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?,
+        Some(path) => match fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) => {
+                eprintln!("oare simulate: cannot read {}: {error}", path.display());
+                return Ok(super::unusable());
+            }
+        },
         None => String::new(),
     };
     let overrides = Overrides { seed: args.seed, hours: args.hours };

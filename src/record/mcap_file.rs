@@ -2,6 +2,7 @@
 //!
 //! Times of messages are mission times (UTC), not those of arrival, so that a viewer shows the flight.
 
+use std::collections::BTreeSet;
 use std::io::{Seek, Write};
 
 use base64::Engine;
@@ -14,6 +15,7 @@ use super::schema::{TOPICS, json_schema};
 use crate::hub::wire::{passing_members, told_anomaly, told_calibration, told_event};
 use crate::hub::{Body, Message, Topic};
 use crate::ingest::wire::{Arrival, LinkConfig, Verdict};
+use crate::pipeline::calibration::Calibration;
 use crate::pipeline::{Settings, Station};
 use crate::units::{Clock, MissionTime};
 
@@ -124,18 +126,21 @@ impl<W: Write + Seek> Recording<W> {
         self.writer.write_to_known_channel(&header, data)
     }
 
-    /// Writes everything but raw seconds that a station has of a span: windows, versions of the calibration, events and anomalies.
+    /// Writes everything but raw seconds that a station has of a span: windows, versions of the calibration that were new in it or that its
+    /// windows are made with, events, and anomalies that reach into it.
     ///
     /// # Errors
     /// When it cannot be written.
     pub fn products(&mut self, station: &Station, from: Clock, to: Clock) -> McapResult<()> {
         let (mission, derived) = (self.mission, station.derived());
         let between = |clock: Clock| (from..=to).contains(&clock);
-        let windows = station.products().filter(|product| between(product.start));
-        let versions = derived.timeline.iter().filter(|version| between(version.known_since));
+        let windows = || station.products().filter(|product| between(product.start));
+        let made_with: BTreeSet<u32> = windows().map(|product| product.calibration).collect();
+        let is_wanted = |version: &&Calibration| between(version.known_since) || made_with.contains(&version.version);
+        let versions = derived.timeline.iter().filter(is_wanted);
         let events = station.events().filter(|event| between(event.clock));
-        let anomalies = derived.anomalies.iter().filter(|anomaly| between(anomaly.from));
-        let bodies = windows
+        let anomalies = derived.anomalies.iter().filter(|anomaly| anomaly.from <= to && from <= anomaly.to);
+        let bodies = windows()
             .map(|product| Body::Window((*product).into()))
             .chain(versions.map(told_calibration))
             .chain(events.map(|event| told_event(&mission, event)))

@@ -442,9 +442,48 @@ async fn an_export_has_the_products_of_the_service() {
         let json = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
         assert_eq!(json(&text(name)), json(served), "{name}");
     }
-    let recording = read("recording.mcap");
-    let recorded = mcap::MessageStream::new(&recording).unwrap();
-    assert!(recorded.filter(|message| message.as_ref().unwrap().channel.topic == "/accel/window").count() > 400);
+    let count = |topic: &str| {
+        let recording = read("recording.mcap");
+        let recorded = mcap::MessageStream::new(&recording).unwrap();
+        recorded.filter(|message| message.as_ref().unwrap().channel.topic == topic).count()
+    };
+    assert!(count("/accel/window") > 400 && count("/accel/calibration") > 0 && count("/accel/anomaly") > 0);
+    // Of a part, with the calibration its windows are made with, and the anomalies that reach into it.
+    let part = ["export", "--data", ".", "--format", "mcap", "--out", "out", "--from", "34500", "--to", "35000"];
+    assert!(oare(&dir, &part).status.success());
+    assert!((10..30).contains(&count("/accel/window")), "{}", count("/accel/window"));
+    assert!(count("/accel/calibration") > 0 && count("/accel/anomaly") > 0);
+}
+
+/// What cannot be used is told with its name, and by the exit code: 2 where nothing is done, 3 where the rest is.
+#[test]
+fn what_a_command_cannot_use_is_told_and_no_input_is_written_over() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, octets: &[u8]| std::fs::write(dir.path().join(name), octets).unwrap();
+    let random: Vec<u8> = (0..50_000u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 13) as u8).collect();
+    let push = "hours = 6\n[[forces.push]]\nfrom_clock_s = 20000.0\nbody_ng = [500.0, 0.0, 0.0]\n";
+    write("random.bin", &random);
+    write("mission.toml", push.as_bytes());
+    std::fs::create_dir(dir.path().join("nothing")).unwrap();
+    let simulate = ["simulate", "--config", "mission.toml", "--out", "a.dump", "--case", "case"];
+    assert!(oare(&dir, &simulate).status.success());
+    let dump = std::fs::read(dir.path().join("a.dump")).unwrap();
+    let cases: [(&[&str], i32, &str); 7] = [
+        (&["process", "a.dump", "random.bin", "--out", "products"], 3, "random.bin: no frame in 50000 octets"),
+        (&["diagnose", "case", "--out", "a.dump"], 2, "a file of the case"),
+        (&["simulate", "--config", "no.toml", "--out", "b.dump"], 2, "no.toml"),
+        (&["simulate", "--out", "b.dump", "--truth", "b.dump"], 2, "b.dump"),
+        (&["challenge", "--effect", "weather"], 2, "no such effect or law"),
+        (&["challenge", "--open", "nowhere"], 2, "nowhere"),
+        (&["challenge", "--open", "nothing"], 2, "truth.json"),
+    ];
+    for (arguments, code, named) in cases {
+        let output = oare(&dir, arguments);
+        let told = String::from_utf8_lossy(&output.stderr).to_string();
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {told}");
+        assert!(told.contains(named), "{arguments:?}: {told}");
+    }
+    assert_eq!(std::fs::read(dir.path().join("a.dump")).unwrap(), dump);
 }
 
 #[tokio::test(flavor = "multi_thread")]
