@@ -10,7 +10,7 @@ use oare_ground::pipeline::product::Revision;
 use oare_ground::pipeline::station::replay;
 use oare_ground::pipeline::{Change, PlaybackId, Settings, Station, files};
 use oare_ground::simulate::recorder::{self, RecorderConfig, playbacks};
-use oare_ground::simulate::{Mission, MissionConfig};
+use oare_ground::simulate::{Fault, Mission, MissionConfig};
 use oare_ground::telemetry::{AccRecord, Mode, Quality, Range, Step};
 use oare_ground::units::Clock;
 
@@ -214,4 +214,33 @@ fn samples_at_the_rail_enter_no_estimate() {
     let difference = railed.acceleration.unwrap().mean_ng.0[2] - clean.acceleration.unwrap().mean_ng.0[2];
     // One of 500 samples at +-16 counts of 4.6 ng left out moves a mean by 0.15 ng at most; at the rail it would be 300 ng.
     assert!(difference.abs() < 0.15, "{difference}");
+}
+
+/// A value a hundred times too large is not told for an hour as if nothing were wrong with it.
+#[test]
+fn a_wrong_range_is_noticed_within_minutes_while_data_come() {
+    const FROM_S: u32 = 40_013;
+    let mut config = MissionConfig::sts65(11, 12.0);
+    config.faults.push(Fault::RangeMisreport { from_clock_s: FROM_S, seconds: 7200 });
+    let link = LinkConfig::default();
+    let mut reader = PlaybackReader::new(link);
+    let mut station = Station::new(Settings::sts65(), None);
+    station.open_playback(PlaybackId(1));
+    let mut noticed_s = None;
+    // Some ten seconds at a time, as they come down in real time.
+    for piece in recorder::frames(Mission::new(config).unwrap().fly(), link).chunks(2) {
+        reader.push(&crate::service_support::cadus(piece), |part| {
+            if let PlaybackPart::Arrival(arrival) = part {
+                station.take(PlaybackId(1), &arrival);
+            }
+        });
+        station.settle();
+        let latest_s = station.ledger().seconds.spans().last().map_or(0, |(_, to)| to);
+        if !station.derived().range_corrections.is_empty() {
+            noticed_s = Some(latest_s - i64::from(FROM_S));
+            break;
+        }
+        assert!(latest_s < i64::from(FROM_S) + 300, "not noticed by {latest_s} s");
+    }
+    assert!(noticed_s.is_some_and(|s| (0..300).contains(&s)), "{noticed_s:?}");
 }

@@ -8,7 +8,7 @@ use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 use super::apply::Calibration;
 use crate::math::shared_work::{both, map};
 use crate::pipeline::archive::{Archive, RECORD_TENTHS};
-use crate::pipeline::window::{AxisWindow, Window, Windows};
+use crate::pipeline::window::{AxisWindow, WINDOW_TENTHS, Window, Windows};
 use crate::telemetry::{AccRecord, Axis, Mode, Range};
 use crate::units::Clock;
 
@@ -138,6 +138,28 @@ struct Span {
     ln_ratio: Vec<f64>,
 }
 
+fn normal(windows: &Windows, known_at: Clock) -> Vec<(i64, &Window)> {
+    let all = windows.iter().filter(|(_, window)| window.known_since <= known_at && window.mode == Mode::Normal);
+    all.map(|(cell, window)| (*cell, window.as_ref())).collect()
+}
+
+/// The middle scatter of each axis over all windows, ng.
+pub fn usual_ng(windows: &Windows, calibration: &Calibration) -> Option<[f64; 3]> {
+    usual_scatter_ng(&normal(windows, Clock::from_tenths(i64::MAX)), &calibration.resolution_ng)
+}
+
+/// Whether a window speaks for another range than the one reported while no correction reaches it: it is time to look for spans.
+pub fn is_news(
+    window: &Window,
+    scatter_ng: [f64; 3],
+    calibration: &Calibration,
+    corrections: &[RangeCorrection],
+) -> bool {
+    let end = window.start.plus_tenths(WINDOW_TENTHS);
+    let is_known = corrections.iter().any(|c| c.from < end && c.to > window.start);
+    window.mode == Mode::Normal && !is_known && best_other(&Usual { scatter_ng, calibration }, window).is_some()
+}
+
 /// Finds the spans, their corrections and what to tell, from what was known at an instrument clock.
 pub fn find(
     archive: &Archive,
@@ -145,11 +167,7 @@ pub fn find(
     calibration: &Calibration,
     known_at: Clock,
 ) -> Vec<(Anomaly, Vec<RangeCorrection>)> {
-    let normal: Vec<(i64, &Window)> = windows
-        .iter()
-        .filter(|(_, window)| window.known_since <= known_at && window.mode == Mode::Normal)
-        .map(|(cell, window)| (*cell, window.as_ref()))
-        .collect();
+    let normal = normal(windows, known_at);
     let Some(scatter_ng) = usual_scatter_ng(&normal, &calibration.resolution_ng) else { return Vec::new() };
     let usual = Usual { scatter_ng, calibration };
     let mut spans: Vec<Span> = Vec::new();

@@ -41,7 +41,7 @@ use self::unsteady::Walks;
 use self::version::{Material, version};
 use super::archive::Archive;
 use super::settings::Settings;
-use super::window::Windows;
+use super::window::{Window, Windows};
 use crate::math::shared_work::both;
 use crate::telemetry::{Axis, Range};
 use crate::units::Clock;
@@ -77,6 +77,8 @@ pub struct Derived {
     /// What each version of the estimated timeline was made from, so that it need not be made again.
     signatures: Vec<u64>,
     estimates: Vec<Calibration>,
+    /// Usual scatter of a window, ng, per axis.
+    usual_ng: Option<[f64; 3]>,
     /// Means of the holds and walks of the calibrations, which depend on nothing but their samples.
     means: HashMap<u64, Means>,
     walks: Walks,
@@ -86,6 +88,12 @@ impl Derived {
     /// The latest version.
     pub fn current(&self) -> Option<&Calibration> {
         self.timeline.last()
+    }
+
+    /// Whether a window says that the records name a wrong range, and that is not told yet.
+    pub fn is_news(&self, window: &Window) -> bool {
+        let known = self.usual_ng.zip(self.current());
+        known.is_some_and(|(usual_ng, current)| misreport::is_news(window, usual_ng, current, &self.range_corrections))
     }
 
     /// The version that was known at an instrument clock.
@@ -245,6 +253,7 @@ fn find_anomalies(archive: &Archive, windows: &Windows, settings: &Settings, der
         || derived.current().map(|calibration| misreport::find(archive, windows, calibration, always)),
         || saturation::runs(archive, windows),
     );
+    derived.usual_ng = derived.current().and_then(|calibration| misreport::usual_ng(windows, calibration));
     for (anomaly, corrections) in misreported.into_iter().flatten() {
         anomalies.push(anomaly);
         derived.range_corrections.extend(corrections);
