@@ -4,7 +4,9 @@ use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
 use oare_ground::ingest::wire::LinkConfig;
+use oare_ground::physics::Vec3;
 use oare_ground::simulate::expected::case_files;
+use oare_ground::simulate::forces::Push;
 use oare_ground::simulate::recorder::{RecorderConfig, frames};
 use oare_ground::simulate::{Fault, Mission, MissionConfig, playbacks};
 
@@ -44,9 +46,15 @@ fn sets_that_a_dump_cannot_tell_apart_have_an_observation_that_would() {
 
 /// The files of a flight of so many hours with faults.
 fn files(hours: f64, faults: Vec<Fault>) -> Vec<(String, Vec<u8>)> {
-    let mission = Mission::new(MissionConfig { faults, ..MissionConfig::sts65(5, hours) }).unwrap();
+    files_of(MissionConfig { faults, ..MissionConfig::sts65(5, hours) })
+}
+
+/// The files of a flight.
+fn files_of(config: MissionConfig) -> Vec<(String, Vec<u8>)> {
+    let seed = config.seed;
+    let mission = Mission::new(config).unwrap();
     let link = LinkConfig::default();
-    let passes = playbacks(&frames(mission.fly(), link), &link, &RecorderConfig::clean(), 5);
+    let passes = playbacks(&frames(mission.fly(), link), &link, &RecorderConfig::clean(), seed);
     let mut files: Vec<(String, Vec<u8>)> = case_files(&mission, "with-fault", "recording.dump")
         .unwrap()
         .into_iter()
@@ -141,4 +149,35 @@ fn an_epoch_that_is_not_that_of_the_records_is_told() {
     let (_, octets) = files.iter_mut().find(|(name, _)| name == "case.toml").unwrap();
     *octets = String::from_utf8(octets.clone()).unwrap().replace("1994-07-", "1995-07-").into_bytes();
     assert_eq!(told(&files), 1);
+}
+
+/// Half a day is short for a leak, and the errors of the bias that all windows share are large: at the noise of a step it is out of reach.
+#[test]
+fn a_leak_in_half_a_day_is_no_step() {
+    for seed in [101, 104, 106] {
+        let mut config = MissionConfig::sts65(seed, 12.0);
+        config.forces.pushes.push(Push {
+            from_clock_s: 36_000.0,
+            until_clock_s: f64::INFINITY,
+            tau_s: Some(9000.0),
+            body_ng: Vec3::new(250.0, -120.0, 300.0),
+        });
+        let found = diagnose(&super::case(&files_of(config)), &Settings::default()).unwrap();
+        let [leak] = &found.effects[..] else { panic!("{seed}: {found:?}") };
+        assert_eq!((found.verdict, leak.id.as_str()), (Verdict::Explained, "vent_leak"), "{seed}");
+        for parameter in &leak.parameters {
+            let truth = match parameter.name.as_str() {
+                "onset_s" => 36_000.0,
+                "tau_s" => 9000.0,
+                "ax_ng" => 250.0,
+                "ay_ng" => -120.0,
+                "az_ng" => 300.0,
+                other => panic!("a leak has no {other}"),
+            };
+            assert!(
+                (parameter.value - truth).abs() < 4.0 * parameter.sigma,
+                "{seed}: {parameter:?}, and it was {truth}"
+            );
+        }
+    }
 }
