@@ -27,7 +27,8 @@ const QUIET_TAU_S: f64 = 3000.0;
 const SHARP: f64 = 150.0;
 const SHARP_MAX: usize = 3;
 
-/// Log score below the best at one noise up to which a set is weighed whatever the next noise makes of it, and how many such sets.
+/// Log score below the best at one noise up to which a set is weighed whatever the next noise makes of it, several times the one by which
+/// a leak and a step were apart that needed it; and how many such sets, each as dear as any that is weighed.
 const ALONG: f64 = 6.0;
 const ALONG_MAX: usize = 3;
 

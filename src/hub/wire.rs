@@ -335,20 +335,19 @@ pub fn told_anomaly(mission: &MissionTime, anomaly: &Anomaly) -> Body {
     Body::Told { topic: Topic::Anomaly, clock: anomaly.from, json }
 }
 
-/// What takes an anomaly back that was told: the same members but for their type.
-pub fn withdrawn_anomaly(mission: &MissionTime, anomaly: &Anomaly) -> Body {
-    let json = members("anomaly_withdrawn", &AnomalyWire::new(mission, anomaly));
-    Body::Told { topic: Topic::Anomaly, clock: anomaly.from, json }
-}
-
 /// How the members begin that tell of an anomaly.
 const ANOMALY: &str = r#""type":"anomaly","#;
-/// How those begin that take one back.
+/// How those begin that take one back: the rest of them is the same.
 const ANOMALY_WITHDRAWN: &str = r#""type":"anomaly_withdrawn","#;
 
-/// The JSON members that take back the anomaly told with these.
-pub fn withdrawal_of(anomaly: &str) -> String {
-    anomaly.replacen(ANOMALY, ANOMALY_WITHDRAWN, 1)
+/// What takes back an anomaly that was told.
+pub fn withdrawn(told: Body) -> Body {
+    match told {
+        Body::Told { topic, clock, json } => {
+            Body::Told { topic, clock, json: json.replacen(ANOMALY, ANOMALY_WITHDRAWN, 1) }
+        }
+        other => other,
+    }
 }
 
 /// The JSON members of the anomaly that these take back, where they take back one.

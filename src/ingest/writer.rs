@@ -15,7 +15,7 @@ use super::listener::Parts;
 use super::log_replay::{Orphans, take_entry, take_log, taken_again};
 use super::raw_log::{Entry, Journal, JournalPart, RawLog, StoreError};
 use crate::hub::status::{Board, Phase, Picture, count};
-use crate::hub::wire::{Gap, members, told_anomaly, told_calibration, told_event, withdrawal_of, withdrawn_anomaly};
+use crate::hub::wire::{Gap, members, told_anomaly, told_calibration, told_event, withdrawn};
 use crate::hub::{Body, Hub, Journaled, SampleSource, Topic};
 use crate::ingest::wire::playback::PlaybackPart;
 use crate::pipeline::{Change, Station};
@@ -451,7 +451,7 @@ fn taken_back(mut told: BTreeMap<(Topic, String), Clock>, now: impl Iterator<Ite
         }
     }
     let gone = told.into_iter().filter(|((topic, _), _)| *topic == Topic::Anomaly);
-    gone.map(|((topic, json), clock)| Body::Told { topic, clock, json: withdrawal_of(&json) }).collect()
+    gone.map(|((topic, json), clock)| withdrawn(Body::Told { topic, clock, json })).collect()
 }
 
 /// What is told whole of a change.
@@ -465,7 +465,7 @@ fn whole(station: &Station, change: &Change) -> Option<Body> {
         }
         Change::Event(event) => Some(told_event(&mission, event)),
         Change::Anomaly(anomaly) => Some(told_anomaly(&mission, anomaly)),
-        Change::AnomalyWithdrawn(anomaly) => Some(withdrawn_anomaly(&mission, anomaly)),
+        Change::AnomalyWithdrawn(anomaly) => Some(withdrawn(told_anomaly(&mission, anomaly))),
         Change::Calibration { .. } => station.calibration().map(told_calibration),
     }
 }

@@ -337,8 +337,8 @@ impl Station {
             };
         });
         // A wrong range makes a value a hundred times too large or too small: that does not wait for the next check.
-        let touched = starts.iter().filter_map(|cell| self.windows.get(cell));
-        self.calibration_touched |= touched.into_iter().any(|window| self.derived.is_news(window));
+        let mut touched = starts.iter().filter_map(|cell| self.windows.get(cell));
+        self.calibration_touched |= touched.any(|window| self.derived.is_news(window));
         starts
     }
 

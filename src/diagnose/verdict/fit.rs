@@ -11,7 +11,7 @@ use crate::math::rms::rms_about_mean;
 /// A remaining autocorrelation this unlikely makes the errors wider.
 const WHITENESS_P: f64 = 1e-3;
 
-/// Errors that all windows share are told from this share of the noise on.
+/// Errors that all windows share are told from this share of the noise on: less does not show in a figure.
 const SHARED_TOLD: f64 = 0.25;
 
 /// Before and after, and by how much the errors must be widened.
