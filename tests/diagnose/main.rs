@@ -1,15 +1,18 @@
 //! The diagnosis on the open cases, and its refusals. Shared data are read where they are; absent, the claim is skipped aloud.
 
 mod bursts;
+mod drag_case;
 mod dump;
 mod formula;
 mod lag;
 mod large;
 mod limits;
 mod listed;
+mod logs;
 mod loud;
 mod odd;
 mod passing;
+mod refused;
 mod resonant;
 mod separating;
 mod smooth;

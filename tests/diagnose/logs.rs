@@ -1,0 +1,55 @@
+//! Logs as they are kept: by another clock, of very many kinds, with one night twice.
+
+use super::drag_case::{drag, files, with_key, with_lines};
+
+#[test]
+fn a_log_of_another_clock_and_a_claim_that_does_not_hold_are_told() {
+    let (.., notes) = drag(&with_lines("case.toml", |lines| {
+        for line in lines.iter_mut().filter(|line| line.starts_with("includes")) {
+            *line = "includes = [\"rotation\", \"aerodynamic_drag\"]".into();
+        }
+    }));
+    let of = |word: &str, notes: &[String]| notes.iter().filter(|note| note.contains(word)).count();
+    let (.., of_no_effect) = drag(&with_key("includes", "[\"rotation\", \"gravity_gradiant\"]"));
+    assert_eq!(of("includes gravity_gradiant: that is none", &of_no_effect), 1, "{of_no_effect:?}");
+    assert_eq!(of("includes aerodynamic_drag: the recording shows", &notes), 1, "{notes:?}");
+    assert_eq!((of("includes rotation", &notes), of("another clock", &notes)), (0, 0), "{notes:?}");
+    let (.., notes) = drag(&with_lines("events.csv", |lines| {
+        for line in &mut lines[1..] {
+            let (clock_s, rest) = line.split_once(',').unwrap();
+            *line = format!("{},{rest}", 1e9 + clock_s.parse::<f64>().unwrap());
+        }
+    }));
+    assert_eq!(of("another clock", &notes), 1, "{notes:?}");
+}
+
+/// A kind to every entry: each would be another chance for noise, and all of them minutes of work.
+#[test]
+fn a_log_of_very_many_kinds_is_tried_in_part_and_told() {
+    let (value, sigma, notes) = drag(&files());
+    assert!(!notes.iter().any(|note| note.contains("kinds of entries")), "{notes:?}");
+    let (beside, _, notes) = drag(&with_lines("events.csv", |lines| {
+        let first = lines[1].clone();
+        let at: f64 = first.split(',').next().unwrap().parse().unwrap();
+        for kind in 0..2000 {
+            for entry in 0..3 {
+                let at = at + 41.0 * f64::from(kind) + 9000.0 * f64::from(entry);
+                lines.push(format!("{at:.1},60.0,kind_{kind},"));
+            }
+        }
+    }));
+    assert!(notes.iter().any(|note| note.contains("kinds of entries: formulas are made of the 32")), "{notes:?}");
+    assert!((beside - value).abs() < 0.5 * sigma, "{beside} for {value}");
+}
+
+/// An entry that is in the log twice, as from two shifts, is one night.
+#[test]
+fn sleep_that_is_logged_twice_is_no_more_sleep() {
+    let twice = with_lines("events.csv", |lines| {
+        let sleep: Vec<String> = lines.iter().filter(|line| line.contains("crew_sleep")).cloned().collect();
+        assert!(!sleep.is_empty());
+        lines.extend(sleep);
+    });
+    let [once, twice] = [files(), twice].map(|files| drag(&files));
+    assert_eq!(once, twice);
+}
