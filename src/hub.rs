@@ -144,14 +144,15 @@ impl Hub {
     }
 
     /// Takes up where an earlier run ended: its journal, what it told of every window, and the number up to which it may have told
-    /// messages that the journal does not hold. `product` gives windows as they are now.
+    /// messages that the journal does not hold. `product` gives windows as they are now; what was told of windows that there are no longer
+    /// is given back.
     pub fn restore(
         &self,
         entries: Vec<Entry>,
         told: impl IntoIterator<Item = Told>,
         numbered_through: u64,
         product: impl Fn(Clock) -> Option<Arc<Product>>,
-    ) {
+    ) -> Vec<Told> {
         let mut state = self.state.write().expect("no holder panics");
         state.forgotten_through = entries.first().map_or(0, |entry| entry.first_seq() - 1);
         state.head_seq = entries.last().map_or(0, Entry::last_seq).max(numbered_through);
@@ -160,14 +161,26 @@ impl Hub {
         }
         let head_seq = state.head_seq;
         state.rings.iter_mut().for_each(|ring| ring.dropped_through = head_seq);
-        for Told { start, seq, revision } in told {
-            if let Some(product) = product(start) {
-                state.windows.insert(start, Held { product, seq, told: revision });
+        let mut gone = Vec::new();
+        for told in told {
+            match product(told.start) {
+                Some(product) => {
+                    state.windows.insert(told.start, Held { product, seq: told.seq, told: told.revision });
+                }
+                None => gone.push(told),
             }
         }
         state.journal = entries.into_iter().map(Arc::new).collect();
         self.note_latest(&state);
         self.head.send_replace(head_seq);
+        gone
+    }
+
+    /// What was told of windows that there are no longer.
+    pub fn gone(&self, is_there: impl Fn(Clock) -> bool) -> Vec<Told> {
+        let state = self.state.read().expect("no holder panics");
+        let gone = state.windows.iter().filter(|(start, _)| !is_there(**start));
+        gone.map(|(start, held)| Told { start: *start, seq: held.seq, revision: held.told }).collect()
     }
 
     /// Everything told whole that the journal still holds and that was not taken back, with the clock it is about.
@@ -247,10 +260,12 @@ impl Hub {
     fn note_latest(&self, state: &State) {
         let newest = state.windows.values().rev().find(|held| held.product.acceleration.is_some());
         let mut latest = self.latest.write().expect("no holder panics");
-        if let Some(held) = newest
-            && latest.is_none_or(|latest| latest.product.revision != held.product.revision)
-        {
-            *latest = Some(Latest { product: *held.product, since: Instant::now() });
+        match newest {
+            Some(held) if latest.is_none_or(|latest| latest.product.revision != held.product.revision) => {
+                *latest = Some(Latest { product: *held.product, since: Instant::now() });
+            }
+            Some(_) => {}
+            None => *latest = None,
         }
     }
 
@@ -287,8 +302,14 @@ impl Hub {
 
 impl State {
     fn take_up(&mut self, seq: u64, body: Body, ring_messages_max: usize) {
-        if let Body::Window(product) | Body::Supersede(product, _) = &body {
-            self.windows.insert(product.start, Held { product: product.clone(), seq, told: product.revision });
+        match &body {
+            Body::Window(product) | Body::Supersede(product, _) => {
+                self.windows.insert(product.start, Held { product: product.clone(), seq, told: product.revision });
+            }
+            Body::Withdrawn { start, .. } => {
+                self.windows.remove(start);
+            }
+            Body::Second(_) | Body::Told { .. } => {}
         }
         let ring = &mut self.rings[body.topic() as usize];
         ring.last_seq = seq;
@@ -321,6 +342,9 @@ fn note_in_journal(entries: &mut Vec<Entry>, seq: u64, body: &Body) {
             if !last.is_some_and(|last| last.continue_with_second(seq, first_clock)) {
                 entries.push(Entry::Seconds { first_seq, count: 1, first_clock, step_tenths: 0 });
             }
+        }
+        Body::Withdrawn { start, json } => {
+            entries.push(Entry::Told { seq, topic: Topic::Window, clock: *start, json: json.clone() });
         }
         Body::Told { topic, clock, json } => {
             entries.push(Entry::Told { seq, topic: *topic, clock: *clock, json: json.clone() });

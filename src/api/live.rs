@@ -54,8 +54,9 @@ enum From {
 /// Live messages over a WebSocket.
 #[utoipa::path(get, path = "/accel/live", tag = "acceleration", params(Wish),
     responses(
-        (status = 101, description = "one JSON object a message: seq, prev, type (hello, lag, window, supersede, gap, raw, calibration, event, \
-            anomaly, anomaly_withdrawn, diagnosis), and the members of that type. anomaly_withdrawn has those of the anomaly that more data take \
+        (status = 101, description = "one JSON object a message: seq, prev, type (hello, lag, window, supersede, window_withdrawn, gap, raw, \
+            calibration, event, anomaly, anomaly_withdrawn, diagnosis), and the members of that type. window_withdrawn has the start of a \
+            window that there is no longer, for its frames have lost their places to others, and the revision told; anomaly_withdrawn has those of the anomaly that more data take \
             back, so that what was told and not withdrawn is what /anomalies gives; diagnosis has those of /diagnosis, of its looks the last alone"),
         (status = 426, description = "the request is none for a WebSocket")))]
 pub async fn live(

@@ -86,6 +86,13 @@ pub enum Body {
     Window(Arc<Product>),
     /// A later revision of a window.
     Supersede(Arc<Product>, Option<Revision>),
+    /// A window that was told of and that there is no longer: the frames it was made from have lost a vote.
+    Withdrawn {
+        /// Where it began.
+        start: Clock,
+        /// The JSON members, `"type"` first.
+        json: String,
+    },
     /// One second of raw samples.
     Second(Box<AccRecord>),
     /// Anything else, in its JSON members, `"type"` first.
@@ -104,6 +111,7 @@ impl Body {
     pub fn window_start(&self) -> Option<Clock> {
         match self {
             Body::Window(product) | Body::Supersede(product, _) => Some(product.start),
+            Body::Withdrawn { start, .. } => Some(*start),
             Body::Second(_) | Body::Told { .. } => None,
         }
     }
@@ -111,7 +119,7 @@ impl Body {
     /// The topic it is told on.
     pub fn topic(&self) -> Topic {
         match self {
-            Body::Window(_) | Body::Supersede(..) => Topic::Window,
+            Body::Window(_) | Body::Supersede(..) | Body::Withdrawn { .. } => Topic::Window,
             Body::Second(_) => Topic::Raw,
             Body::Told { topic, .. } => *topic,
         }

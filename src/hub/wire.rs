@@ -8,6 +8,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::message::{Body, Message, Topic};
+use super::told::Told;
 use crate::pipeline::calibration::{Anomaly, Calibration};
 use crate::pipeline::files::version_json;
 use crate::pipeline::product::{BodyAcceleration, BodyVector, Product};
@@ -355,6 +356,22 @@ pub fn withdrawn_by(members: &str) -> Option<String> {
     members.strip_prefix(ANOMALY_WITHDRAWN).map(|rest| format!("{ANOMALY}{rest}"))
 }
 
+/// A window that there is no longer.
+#[derive(Serialize)]
+struct WindowWithdrawn {
+    window_start_clock_s: f64,
+    met_s: f64,
+    utc: String,
+    revision: String,
+}
+
+/// What takes back a window that was told.
+pub fn window_withdrawn(mission: &MissionTime, told: &Told) -> Body {
+    let Time { clock_s, met_s, utc } = Time::new(mission, told.start);
+    let gone = WindowWithdrawn { window_start_clock_s: clock_s, met_s, utc, revision: told.revision.to_string() };
+    Body::Withdrawn { start: told.start, json: members("window_withdrawn", &gone) }
+}
+
 /// What is told whole of a version of the calibration.
 pub fn told_calibration(version: &Calibration) -> Body {
     let json = members("calibration", &version_json(version));
@@ -395,6 +412,6 @@ fn made_members(mission: &MissionTime, message: &Message) -> String {
             }
         }
         Body::Second(record) => members("raw", &RawSecond::new(mission, record)),
-        Body::Told { json, .. } => json.clone(),
+        Body::Withdrawn { json, .. } | Body::Told { json, .. } => json.clone(),
     }
 }

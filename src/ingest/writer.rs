@@ -3,7 +3,9 @@
 //! It runs on a thread of its own. Nothing counts a frame before the raw log holds it. After a restart the log is taken again, and
 //! only what the journal does not hold yet is published.
 
-use std::collections::{BTreeMap, HashMap};
+mod telling;
+
+use std::collections::HashMap;
 use std::sync::{Arc, RwLock};
 use std::time::{Duration, Instant};
 
@@ -11,12 +13,15 @@ use tokio::runtime::Handle;
 use tokio::sync::mpsc;
 use tokio_util::sync::CancellationToken;
 
+use telling::{body, picture, taken_back, whole};
+
 use super::listener::Parts;
 use super::log_replay::{Orphans, take_entry, take_log, taken_again};
 use super::raw_log::{Entry, Journal, JournalPart, RawLog, StoreError};
 use crate::hub::status::{Board, Phase, Picture, count};
-use crate::hub::wire::{Gap, members, told_anomaly, told_calibration, told_event, withdrawn};
-use crate::hub::{Body, Hub, Journaled, SampleSource, Topic};
+use crate::hub::told::Told;
+use crate::hub::wire::{told_anomaly, window_withdrawn};
+use crate::hub::{Body, Hub, Journaled, SampleSource};
 use crate::ingest::wire::playback::PlaybackPart;
 use crate::pipeline::{Change, Station};
 use crate::telemetry::AccRecord;
@@ -126,11 +131,11 @@ impl Writer {
             aside_waits: false,
             aside_failed: None,
         };
-        let changes = writer.restore_hub(journal);
+        let (changes, gone) = writer.restore_hub(journal);
         let closing = orphans.closing();
         writer.write(&closing, NUMBERS_AHEAD)?;
         writer.take(&closing);
-        writer.publish_untold(changes);
+        writer.publish_untold(changes, &gone);
         writer.published = writer.batch;
         writer.journal()?;
         writer.show();
@@ -138,13 +143,14 @@ impl Writer {
         Ok(writer)
     }
 
-    /// The hub takes up the journal of an earlier run; what may have to be told beside it.
-    fn restore_hub(&mut self, journal: Journal) -> Vec<Change> {
+    /// The hub takes up the journal of an earlier run; what may have to be told beside it, and what was told of windows that there are no
+    /// longer.
+    fn restore_hub(&mut self, journal: Journal) -> (Vec<Change>, Vec<Told>) {
         let mut station = self.station.write().expect("no holder panics");
         let changes = station.flush();
         let product = |start| station.product(start).cloned();
-        self.hub.restore(journal.entries, journal.told, journal.numbered_through, product);
-        changes
+        let gone = self.hub.restore(journal.entries, journal.told, journal.numbered_through, product);
+        (changes, gone)
     }
 
     /// Works until all connections are gone and everything they brought is durable, or until `give_up`.
@@ -374,19 +380,20 @@ impl Writer {
         let Some(mut again) = again else { return };
         let changes = again.settle();
         again.announce_raw(true);
+        let gone = self.hub.gone(|start| again.product(start).is_some());
         *self.station.write().expect("no holder panics") = again;
         self.taken_again = Some((Instant::now(), start.elapsed()));
         self.aside_waits = false;
-        self.publish_untold(changes);
+        self.publish_untold(changes, &gone);
         self.show();
     }
 
     /// Publishes what a station that has told nothing yet says, but for what was told before; a window is told again only where
     /// its revision is another one. Of anomalies all that there are now are told, and those told before that there are no longer are
-    /// taken back, whatever the changes say of how it came.
-    fn publish_untold(&mut self, mut changes: Vec<Change>) {
+    /// taken back, whatever the changes say of how it came, and so are windows that are `gone`.
+    fn publish_untold(&mut self, mut changes: Vec<Change>, gone: &[Told]) {
         let told = self.hub.told_texts();
-        let taken_back = {
+        let taken_back: Vec<Body> = {
             let station = self.station.read().expect("no holder panics");
             let anomalies = &station.derived().anomalies;
             changes.retain(|change| !matches!(change, Change::Anomaly(_) | Change::AnomalyWithdrawn(_)));
@@ -396,7 +403,8 @@ impl Writer {
                 _ => true,
             });
             let mission = station.settings().time;
-            taken_back(told, anomalies.iter().map(|anomaly| told_anomaly(&mission, anomaly)))
+            let of_anomalies = taken_back(told, anomalies.iter().map(|anomaly| told_anomaly(&mission, anomaly)));
+            gone.iter().map(|told| window_withdrawn(&mission, told)).chain(of_anomalies).collect()
         };
         self.unjournaled.extend(self.hub.publish(taken_back));
         self.publish(changes);
@@ -427,72 +435,6 @@ impl Writer {
         let station = self.station.read().expect("no holder panics");
         let picture = picture(&station);
         self.board.show(Picture { settled: picture.settled && !self.aside_waits, ..picture });
-    }
-}
-
-/// What a change says to readers; `None` when they know.
-fn body(hub: &Hub, station: &Station, change: Change) -> Option<Body> {
-    match change {
-        Change::Window { product, .. } => match hub.told_revision(product.start) {
-            Some(revision) if revision == product.revision => None,
-            Some(revision) => Some(Body::Supersede(product, Some(revision))),
-            None => Some(Body::Window(product)),
-        },
-        Change::Raw(record) => Some(Body::Second(record)),
-        change => whole(station, &change),
-    }
-}
-
-/// What takes back the anomalies that were told and are not among those there are now.
-fn taken_back(mut told: BTreeMap<(Topic, String), Clock>, now: impl Iterator<Item = Body>) -> Vec<Body> {
-    for anomaly in now {
-        if let Body::Told { topic, json, .. } = anomaly {
-            told.remove(&(topic, json));
-        }
-    }
-    let gone = told.into_iter().filter(|((topic, _), _)| *topic == Topic::Anomaly);
-    gone.map(|((topic, json), clock)| withdrawn(Body::Told { topic, clock, json })).collect()
-}
-
-/// What is told whole of a change.
-fn whole(station: &Station, change: &Change) -> Option<Body> {
-    let mission = station.settings().time;
-    match change {
-        Change::Window { .. } | Change::Raw(_) => None,
-        Change::Gap { from, to } => {
-            let json = members("gap", &Gap::new(&mission, *from, *to));
-            Some(Body::Told { topic: Topic::Window, clock: *from, json })
-        }
-        Change::Event(event) => Some(told_event(&mission, event)),
-        Change::Anomaly(anomaly) => Some(told_anomaly(&mission, anomaly)),
-        Change::AnomalyWithdrawn(anomaly) => Some(withdrawn(told_anomaly(&mission, anomaly))),
-        Change::Calibration { .. } => station.calibration().map(told_calibration),
-    }
-}
-
-fn picture(station: &Station) -> Picture {
-    let ledger = station.ledger();
-    let total = ledger.total();
-    let refused: u64 = total.frames_refused.values().sum();
-    let latest = ledger.seconds.spans().last().map(|(_, to)| to as f64);
-    Picture {
-        frames_durable: total.frames_new + total.frames_repeated + refused,
-        frames_new: total.frames_new,
-        frames_repeated: total.frames_repeated,
-        frames_refused: total.frames_refused.iter().map(|(reason, n)| (reason.word(), *n)).collect(),
-        packets: total.packets,
-        packets_refused: total.packets_refused,
-        bits_in: total.bits_in,
-        frame_conflicts: ledger.frame_conflicts,
-        playbacks: ledger.playbacks().count() as u64,
-        playbacks_open: ledger.playbacks().filter(|(_, playback)| !playback.closed).count() as u64,
-        seconds_covered: ledger.seconds.len(),
-        gaps: station.gaps(),
-        latest_clock_s: latest,
-        calibration: station.calibration().map_or(0, |calibration| calibration.version),
-        events: station.events().count() as u64,
-        anomalies: station.derived().anomalies.len() as u64,
-        settled: station.is_settled(),
     }
 }
 

@@ -25,7 +25,7 @@ pub fn cell_of(clock: Clock) -> i64 {
 pub enum Addition {
     /// New.
     New,
-    /// The same packet again.
+    /// The same packet again, whether it has its place or has lost it.
     Repeat,
     /// Another packet claims the place; the lower one stays, and whether that changed the archive.
     Conflict {
@@ -38,6 +38,8 @@ pub enum Addition {
 #[derive(Debug, Default)]
 pub struct Archive {
     cells: BTreeMap<i64, Vec<AccRecord>>,
+    /// Science records whose place is another's, so that each counts as a conflict once, whichever came first.
+    lost: BTreeMap<Clock, Vec<AccRecord>>,
     housekeeping: Timeline<Housekeeping>,
     table: Timeline<TableReport>,
     events: Timeline<Event>,
@@ -65,10 +67,12 @@ impl Archive {
             if *held == acc {
                 return Addition::Repeat;
             }
-            let replaced = precedence(&acc) < precedence(held);
-            if replaced {
-                *held = acc;
+            let lost = self.lost.entry(acc.clock).or_default();
+            if lost.contains(&acc) {
+                return Addition::Repeat;
             }
+            let replaced = precedes(&acc, held);
+            lost.push(if replaced { std::mem::replace(held, acc) } else { acc });
             return Addition::Conflict { replaced };
         }
         if cell.capacity() == 0 {
@@ -126,7 +130,13 @@ impl Archive {
     }
 }
 
-/// The order in which two different records of one instant compare.
+/// Whether the first of two different records of one instant stays.
+fn precedes(a: &AccRecord, b: &AccRecord) -> bool {
+    let by_temperature = a.temperature_c.total_cmp(&b.temperature_c);
+    precedence(a).cmp(&precedence(b)).then(by_temperature).is_lt()
+}
+
+/// What is compared of a record, first to last, but for its temperature.
 fn precedence(acc: &AccRecord) -> (u16, i64, [[i16; 3]; 10], [usize; 3], u8, u8) {
     (
         acc.sequence,

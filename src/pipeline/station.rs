@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::archive::{Addition, Archive, cell_of};
+use super::calibration::sequence::is_of_a_hold;
 use super::calibration::{self, Anomaly, Calibration, Derived, KnownCalibration, RangeCorrection};
 use super::derive;
 use super::frames::{FrameDigest, FrameSet, Novelty};
@@ -15,7 +16,7 @@ use crate::ingest::wire::packet::apid;
 use crate::ingest::wire::{
     Apid, Arrival, Assembled, Assembler, FrameId, PacketRefusal, Record, SpacePacket, TransferFrame, Verdict,
 };
-use crate::telemetry::{AccRecord, Event, Mode};
+use crate::telemetry::{AccRecord, Event};
 use crate::units::Clock;
 
 /// Something that consumers of the products may want to know.
@@ -79,9 +80,9 @@ pub struct Station {
     touched: BTreeSet<i64>,
     /// Whether anything that calibration depends on is new.
     calibration_touched: bool,
-    /// Latest record, and latest one that is not of normal mode.
+    /// Latest record, and latest one in which a calibration measured: from the one to the other it is known when that one is over.
     latest: Option<Clock>,
-    latest_calibrating: Option<Clock>,
+    latest_hold: Option<Clock>,
     /// Whether anything is new that the checks of the calibration look at, and in how many cells; they wait for the next
     /// calibration, for [`CHECK_CELLS`] or for [`Station::flush`].
     checks_touched: bool,
@@ -119,7 +120,7 @@ impl Station {
             touched: BTreeSet::new(),
             calibration_touched: true,
             latest: None,
-            latest_calibrating: None,
+            latest_hold: None,
             checks_touched: false,
             cells_unchecked: 0,
             unannounced: BTreeSet::new(),
@@ -225,7 +226,7 @@ impl Station {
             playback.seconds.add(acc.clock);
         }
         let copy = match &record {
-            Record::Acc(acc) => Some((acc.clock, acc.mode)),
+            Record::Acc(acc) => Some((acc.clock, is_of_a_hold(acc))),
             _ => None,
         };
         let change = match &record {
@@ -244,10 +245,10 @@ impl Station {
         }
         self.waiting.extend(change);
         match copy {
-            Some((clock, mode)) => {
+            Some((clock, of_a_hold)) => {
                 self.ledger.seconds.add(clock);
                 self.touched.insert(cell_of(clock));
-                self.calibration_touched |= self.ends_calibration(clock, mode);
+                self.calibration_touched |= self.ends_calibration(clock, of_a_hold);
                 self.checks_touched = true;
             }
             None => self.checks_touched = true,
@@ -255,14 +256,14 @@ impl Station {
     }
 
     /// Whether this record completes a calibration, or belongs to one that is complete.
-    fn ends_calibration(&mut self, clock: Clock, mode: Mode) -> bool {
+    fn ends_calibration(&mut self, clock: Clock, of_a_hold: bool) -> bool {
         self.latest = self.latest.max(Some(clock));
         let before = |later: Option<Clock>| later.map_or(0, |later| later.tenths() - clock.tenths());
-        if mode != Mode::Normal {
-            self.latest_calibrating = self.latest_calibrating.max(Some(clock));
+        if of_a_hold {
+            self.latest_hold = self.latest_hold.max(Some(clock));
             return before(self.latest) >= calibration::CALIBRATION_OVER_TENTHS;
         }
-        let since = -before(self.latest_calibrating);
+        let since = -before(self.latest_hold);
         (0..OVER_TENTHS).contains(&(since - calibration::CALIBRATION_OVER_TENTHS))
     }
 

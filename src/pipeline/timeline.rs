@@ -18,11 +18,13 @@ type Key = (Clock, u16);
 #[derive(Debug)]
 pub struct Timeline<T> {
     chunks: BTreeMap<i64, Vec<(Key, T)>>,
+    /// Packets whose place is another's, so that each counts as a conflict once, whichever came first.
+    lost: BTreeMap<Key, Vec<T>>,
 }
 
 impl<T> Default for Timeline<T> {
     fn default() -> Self {
-        Self { chunks: BTreeMap::new() }
+        Self { chunks: BTreeMap::new(), lost: BTreeMap::new() }
     }
 }
 
@@ -42,10 +44,13 @@ impl<T: PartialEq + std::fmt::Debug> Timeline<T> {
             }
             Ok(at) if chunk[at].1 == value => Addition::Repeat,
             Ok(at) => {
-                let replaced = format!("{value:?}") < format!("{:?}", chunk[at].1);
-                if replaced {
-                    chunk[at].1 = value;
+                let lost = self.lost.entry(key).or_default();
+                if lost.contains(&value) {
+                    return Addition::Repeat;
                 }
+                let held = &mut chunk[at].1;
+                let replaced = format!("{value:?}") < format!("{held:?}");
+                lost.push(if replaced { std::mem::replace(held, value) } else { value });
                 Addition::Conflict { replaced }
             }
         }
@@ -72,6 +77,11 @@ mod tests {
             let held: Vec<&str> = timeline.iter().copied().collect();
             assert_eq!(held, ["a", "b", "c"]);
             assert_eq!(timeline.add(Clock::from_tenths(-5), 1, "a"), Addition::Repeat);
+            assert_eq!(
+                timeline.add(Clock::from_tenths(20_001), 3, "d"),
+                Addition::Repeat,
+                "it has lost its place before"
+            );
             assert_eq!(timeline.add(Clock::from_tenths(20_001), 3, "e"), Addition::Conflict { replaced: false });
         }
     }

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rapidhash::v3::rapidhash_v3;
 
-use super::archive::{Archive, CELL_TENTHS};
+use super::archive::{Archive, CELL_TENTHS, RECORD_TENTHS};
 use super::settings::WindowPolicy;
 use crate::math::ranked::{Pair, Ranked};
 use crate::math::robust::{TrimmedMean, trimmed_mean};
@@ -141,6 +141,11 @@ impl Window {
     /// Middle of the window, s.
     pub fn centre_s(&self) -> f64 {
         self.start.plus_tenths(WINDOW_TENTHS / 2).seconds()
+    }
+
+    /// Whether its time is over at an instrument clock: nothing more can come for it but what comes late.
+    pub fn is_over(&self, clock: Clock) -> bool {
+        self.known_since.max(self.start.plus_tenths(WINDOW_TENTHS - RECORD_TENTHS)) <= clock
     }
 
     /// The window that starts with cell `cell`, of its two halves; None when both are empty.

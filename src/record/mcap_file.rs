@@ -103,6 +103,7 @@ impl<W: Write + Seek> Recording<W> {
         let (channel, clock) = match &message.body {
             Body::Second(_) => return Ok(()),
             Body::Window(product) | Body::Supersede(product, _) => (1, product.start),
+            Body::Withdrawn { start, .. } => (1, *start),
             Body::Told { topic, clock, .. } => (channel_of(*topic), *clock),
         };
         let mission = self.mission;

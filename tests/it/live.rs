@@ -264,6 +264,37 @@ async fn assert_told_is_what_stands(running: &Running) -> Vec<Value> {
     messages
 }
 
+/// Windows of frames that lose their places to others, seen in more playbacks, are no windows any more: not for those who ask, and not for
+/// those who listen.
+#[tokio::test(flavor = "multi_thread")]
+async fn windows_whose_frames_lose_their_places_are_withdrawn() {
+    let running = start().await;
+    running.send(&dump(10_000, 600, 0)).await;
+    let before = running.wait_for_playbacks(1).await["accel"]["windows"].clone();
+    let far = dump(20_000, 130, 5000);
+    running.send(&far).await;
+    running.wait_for_playbacks(2).await;
+    let known = running.get("/accel/history?from=19900&max_points=1000").await["windows"].clone();
+    assert!(known.as_u64().unwrap() >= 4, "{known}");
+    // The same places with seconds that are known: in two playbacks that differ.
+    let known_seconds = dump(10_000, 130, 5000);
+    running.send(&known_seconds).await;
+    running.send(&[known_seconds, dump(10_600, 60, 9000)].concat()).await;
+    let gone = |status: &Value| status["ingest"]["frame_conflicts"] != 0 && status["ingest"]["seconds_covered"] == 660;
+    running.wait_for("the vote", gone).await;
+    running.wait_for_playbacks(4).await;
+    assert_eq!(running.get("/accel/history?from=19900&max_points=1000").await["windows"], 0, "{before} windows before");
+    let last = running.service.hub.head_seq();
+    let last = running.service.hub.last_seq_on(Topics::from_words("window").unwrap(), last);
+    let messages = running.live("topics=window&from=seq:0").await.through(last).await;
+    let withdrawn = starts(&messages, "window_withdrawn");
+    assert_eq!(withdrawn.len() as u64, known.as_u64().unwrap(), "{withdrawn:?}");
+    assert!(withdrawn.iter().all(|start| *start >= 19_900), "{withdrawn:?}");
+    let windows = running.get("/status").await["accel"]["windows"].clone();
+    let running = running.restart().await;
+    assert_eq!(running.wait_for_playbacks(4).await["accel"]["windows"], windows);
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_plain_request_is_told_that_a_websocket_is_needed() {
     let running = start().await;

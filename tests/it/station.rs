@@ -38,6 +38,11 @@ fn record(second: i64, offset: i16) -> AccRecord {
 
 /// Frames of channel 1 that carry these records.
 fn frames(records: &[AccRecord]) -> Vec<Arrival> {
+    frames_from(0, records)
+}
+
+/// The same, counted from a number on.
+fn frames_from(first_count: u32, records: &[AccRecord]) -> Vec<Arrival> {
     let link = LinkConfig::default();
     let mut octets: Vec<u8> = records
         .iter()
@@ -63,15 +68,15 @@ fn frames(records: &[AccRecord]) -> Vec<Arrival> {
         .chunks(data_octets)
         .enumerate()
         .map(|(count, data)| {
-            let id = FrameId { channel: 1, count: count as u32 };
-            Arrival {
-                sense: Sense::ALL[0],
-                first_bit: 0,
-                verdict: Verdict::Good(id),
-                octets: frame::write(&link, id, count as u8, first_header(count * data_octets), data),
-            }
+            let id = FrameId { channel: 1, count: first_count + count as u32 };
+            good(id, frame::write(&link, id, count as u8, first_header(count * data_octets), data))
         })
         .collect()
+}
+
+/// A good frame, forward.
+fn good(id: FrameId, octets: Vec<u8>) -> Arrival {
+    Arrival { sense: Sense::ALL[0], first_bit: 0, verdict: Verdict::Good(id), octets }
 }
 
 fn known() -> KnownCalibration {
@@ -243,4 +248,52 @@ fn a_wrong_range_is_noticed_within_minutes_while_data_come() {
         assert!(latest_s < i64::from(FROM_S) + 300, "not noticed by {latest_s} s");
     }
     assert!(noticed_s.is_some_and(|s| (0..300).contains(&s)), "{noticed_s:?}");
+}
+
+/// Two records of one second that differ in no more than the temperature: the same one stays, and the count of conflicts is the same,
+/// whichever comes first and however often.
+#[test]
+fn of_two_records_of_a_second_the_same_one_stays_in_every_order() {
+    let colder = record(300, 0);
+    let warmer = AccRecord { temperature_c: 4.5, ..colder };
+    let others: Vec<AccRecord> = (0..300).chain(301..600).map(|second| record(second, 0)).collect();
+    let made = |order: &[AccRecord]| {
+        let mut station = Station::new(Settings::sts65(), None);
+        for (n, record) in (1..).zip(order) {
+            let id = PlaybackId(n);
+            station.open_playback(id);
+            // In frames of their own, so that none is another's repeat.
+            frames_from(1000 * n, &[*record]).iter().for_each(|arrival| station.take(id, arrival));
+        }
+        let id = PlaybackId(100);
+        station.open_playback(id);
+        frames(&others).iter().for_each(|arrival| station.take(id, arrival));
+        station.flush();
+        (files::windows_csv(&station), station.ledger().total().packets_refused)
+    };
+    let one = made(&[colder, warmer, colder]);
+    assert_eq!(one, made(&[warmer, colder, warmer]));
+    assert_eq!(one.1["conflict"], 1);
+}
+
+/// A version of the calibration is in use from the instant on since which it is known, and not from the next one that is looked at.
+#[test]
+fn a_version_is_in_use_since_it_is_known() {
+    let mission = Mission::new(MissionConfig::sts65(5, 5.5)).unwrap();
+    let mut station = Station::new(Settings::sts65(), None);
+    let id = PlaybackId(1);
+    station.open_playback(id);
+    let mut told = Vec::new();
+    for (count, octets) in (0..).zip(recorder::frames(mission.fly(), LinkConfig::default())) {
+        station.take(id, &good(FrameId { channel: 1, count }, octets));
+        station.settle();
+        let latest = station.ledger().seconds.spans().last().map(|(_, to)| to - 1);
+        told.extend(latest.map(|second| (Clock::from_tenths(second * 10), station.calibration().map(|c| c.version))));
+    }
+    station.flush();
+    let versions = station.derived().timeline.len();
+    assert!(versions >= 2, "{versions}");
+    for (clock, version) in told {
+        assert_eq!(version, station.derived().as_of(clock).map(|c| c.version), "at {}", clock.seconds());
+    }
 }

@@ -97,6 +97,17 @@ function take(window) {
   dirty = true;
 }
 
+// A window that there is no longer: its frames have lost their places to others.
+function drop(gone) {
+  const startS = gone.window_start_clock_s;
+  windows.delete(startS);
+  if (latest && (latest.window_start_clock_s ?? latest.clock_s) === startS) {
+    const known = [...windows.values()].filter((window) => window.ax_ng !== null);
+    latest = known.reduce((a, b) => !a || b.window_start_clock_s > a.window_start_clock_s ? b : a, null);
+  }
+  dirty = true;
+}
+
 // ---- modes, gaps and dumps ------------------------------------------------------------------------------------------
 function drawTimeline() {
   const canvas = byId("timeline"), width = canvas.clientWidth, height = 86, ratio = devicePixelRatio || 1;
@@ -240,6 +251,7 @@ function live() {
     const message = JSON.parse(frame.data);
     lastSeq = message.seq;
     if (message.type === "window" || message.type === "supersede") take(message);
+    if (message.type === "window_withdrawn") drop(message);
     if (message.type === "diagnosis") refreshDiagnosis();
     if (message.type === "lag") chip("link", `live, ${message.count} missed`, "wait");
   };

@@ -8,7 +8,8 @@
 //! told by [`BiasFit::carried`].
 //!
 //! The fit is Levenberg-Marquardt over A1..A4, ln t0, ln t1 from several starts, each start a linear solution at fixed time
-//! constants. Measurements far from all others lose weight (Huber), and beyond [`OUTLIER_SIGMA`] their vote.
+//! constants. The measurement farthest from the law of all others is set aside, one at a time, while it is beyond [`OUTLIER_SIGMA`]; those
+//! left that are far from it lose weight (Huber).
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Matrix6, SMatrix, VecStorage, Vector6};
@@ -22,6 +23,12 @@ pub const PARAMETERS: usize = 6;
 pub const OUTLIER_SIGMA: f64 = 6.0;
 /// Weight starts to fall here, standard errors.
 const HUBER_SIGMA: f64 = 3.0;
+/// Chi squared by which one must be above all others to be the outlier: odds of twenty.
+const CLEARLY: f64 = 6.0;
+/// Measurements that are tried without, to find the outlier: as many as a day has, in which a large one bends the law most.
+const SUSPECTS: usize = 8;
+/// Of so many measurements one may be set aside.
+const ASIDE_ONE_OF: usize = 3;
 /// Reweighting passes.
 const PASSES: usize = 6;
 /// Hours over which a drift that the law does not describe is taken to forget itself.
@@ -317,27 +324,61 @@ fn information(points: &[Point], weights: &[f64], law: &BiasLaw) -> Matrix6<f64>
 pub fn fit(points: &[Point], expectation: &Expectation) -> Option<BiasFit> {
     let mut values: Vec<f64> = points.iter().map(|point| point.counts).collect();
     let centre = crate::math::robust::median(&mut values)?;
+    let fitted = |weights: &[f64], warm: Option<&DVector<f64>>| {
+        let theta = minimise(points, weights, expectation, centre, warm)?;
+        Some((judge(points, weights, expectation, &theta)?, theta))
+    };
     let mut weights = vec![1.0; points.len()];
-    let mut theta = minimise(points, &weights, expectation, centre, None)?;
-    let mut judged = judge(points, &weights, expectation, &theta)?;
+    let (mut judged, mut theta) = fitted(&weights, None)?;
+    // One at a time: a large error bends the law until good measurements are as far from it.
+    for _ in 0..points.len() / ASIDE_ONE_OF {
+        let left = |n: usize| {
+            let mut without = weights.clone();
+            without[n] = 0.0;
+            let theta = minimise(points, &without, expectation, centre, None)?;
+            let problem = Problem { points, weights: &without, expectation, centre, theta };
+            Some((problem.residuals()?.norm_squared(), n))
+        };
+        let mut without: Vec<(f64, usize)> = suspects(&judged.deleted_sigmas, &weights).filter_map(left).collect();
+        without.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((least, worst)) = without.first().copied() else { break };
+        let with = Problem { points, weights: &weights, expectation, centre, theta: theta.clone() };
+        let gained = with.residuals()?.norm_squared() - least;
+        // Where setting aside another does as well, neither is the one: the scatter widens the errors then.
+        let is_the_one = without.get(1).is_none_or(|next| next.0 - least > CLEARLY);
+        if gained < OUTLIER_SIGMA * OUTLIER_SIGMA || !is_the_one {
+            break;
+        }
+        weights[worst] = 0.0;
+        (judged, theta) = fitted(&weights, None)?;
+    }
     for _ in 0..PASSES {
-        let next: Vec<f64> = judged.deleted_sigmas.iter().map(|z| weight_of(z.abs())).collect();
+        let next: Vec<f64> = judged.deleted_sigmas.iter().zip(&weights).map(|(z, held)| weight_of(*z, *held)).collect();
         let settled = next.iter().zip(&weights).all(|(a, b)| (a - b).abs() < 0.01);
         if settled {
             break;
         }
         let restart = next.iter().zip(&weights).any(|(a, b)| (*a == 0.0) != (*b == 0.0));
         weights = next;
-        theta = minimise(points, &weights, expectation, centre, (!restart).then_some(&theta))?;
-        judged = judge(points, &weights, expectation, &theta)?;
+        (judged, theta) = fitted(&weights, (!restart).then_some(&theta))?;
     }
     Some(judged)
 }
 
-/// Huber's weight, and none beyond the outlier's bound.
-fn weight_of(sigmas: f64) -> f64 {
-    match sigmas {
-        z if z > OUTLIER_SIGMA => 0.0,
+/// The measurements with a vote that are farthest from the law of all others, where any is beyond the outlier's bound.
+fn suspects(deleted_sigmas: &[f64], weights: &[f64]) -> impl Iterator<Item = usize> {
+    let voting = (0..deleted_sigmas.len()).filter(|n| weights[*n] > 0.0);
+    let mut by_size: Vec<(f64, usize)> = voting.map(|n| (deleted_sigmas[n].abs(), n)).collect();
+    by_size.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let any = by_size.first().is_some_and(|(largest, _)| *largest > OUTLIER_SIGMA);
+    by_size.truncate(if any { SUSPECTS } else { 0 });
+    by_size.into_iter().map(|(_, n)| n)
+}
+
+/// Huber's weight; a measurement set aside before has none beyond the outlier's bound.
+fn weight_of(deleted_sigma: f64, held: f64) -> f64 {
+    match deleted_sigma.abs() {
+        z if z > OUTLIER_SIGMA && held == 0.0 => 0.0,
         z if z > HUBER_SIGMA => HUBER_SIGMA / z,
         _ => 1.0,
     }

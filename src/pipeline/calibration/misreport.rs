@@ -138,17 +138,18 @@ struct Span {
     ln_ratio: Vec<f64>,
 }
 
+/// The windows of normal mode that were over at an instrument clock: one that was not said something else then than it says now.
 fn normal(windows: &Windows, known_at: Clock) -> Vec<(i64, &Window)> {
-    let all = windows.iter().filter(|(_, window)| window.known_since <= known_at && window.mode == Mode::Normal);
+    let all = windows.iter().filter(|(_, window)| window.is_over(known_at) && window.mode == Mode::Normal);
     all.map(|(cell, window)| (*cell, window.as_ref())).collect()
 }
 
 /// The middle scatter of each axis over all windows, ng.
-pub fn usual_ng(windows: &Windows, calibration: &Calibration) -> Option<[f64; 3]> {
-    usual_scatter_ng(&normal(windows, Clock::from_tenths(i64::MAX)), &calibration.resolution_ng)
+pub fn usual_ng(windows: &Windows, calibration: &Calibration, known_at: Clock) -> Option<[f64; 3]> {
+    usual_scatter_ng(&normal(windows, known_at), &calibration.resolution_ng)
 }
 
-/// Whether a window speaks for another range than the one reported while no correction reaches it: it is time to look for spans.
+/// Whether a window that has its last second speaks for another range than the one reported while no correction reaches it: it is time to look for spans.
 pub fn is_news(
     window: &Window,
     scatter_ng: [f64; 3],
@@ -157,7 +158,10 @@ pub fn is_news(
 ) -> bool {
     let end = window.start.plus_tenths(WINDOW_TENTHS);
     let is_known = corrections.iter().any(|c| c.from < end && c.to > window.start);
-    window.mode == Mode::Normal && !is_known && best_other(&Usual { scatter_ng, calibration }, window).is_some()
+    window.mode == Mode::Normal
+        && window.is_over(window.known_since)
+        && !is_known
+        && best_other(&Usual { scatter_ng, calibration }, window).is_some()
 }
 
 /// Finds the spans, their corrections and what to tell, from what was known at an instrument clock.

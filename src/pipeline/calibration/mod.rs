@@ -39,7 +39,7 @@ use self::time_correlation::TimeCorrelation;
 use self::two_position::Pair;
 use self::unsteady::Walks;
 use self::version::{Material, version};
-use super::archive::Archive;
+use super::archive::{Archive, RECORD_TENTHS};
 use super::settings::Settings;
 use super::window::{Window, Windows};
 use crate::math::shared_work::both;
@@ -248,12 +248,12 @@ fn signature(
 
 fn find_anomalies(archive: &Archive, windows: &Windows, settings: &Settings, derived: &mut Derived) {
     let mut anomalies = Vec::new();
-    let always = Clock::from_tenths(i64::MAX);
+    let latest = archive.span().map_or(Clock::from_tenths(0), |(_, behind)| behind.plus_tenths(-RECORD_TENTHS));
     let (misreported, at_rail) = both(
-        || derived.current().map(|calibration| misreport::find(archive, windows, calibration, always)),
+        || derived.current().map(|calibration| misreport::find(archive, windows, calibration, latest)),
         || saturation::runs(archive, windows),
     );
-    derived.usual_ng = derived.current().and_then(|calibration| misreport::usual_ng(windows, calibration));
+    derived.usual_ng = derived.current().and_then(|calibration| misreport::usual_ng(windows, calibration, latest));
     for (anomaly, corrections) in misreported.into_iter().flatten() {
         anomalies.push(anomaly);
         derived.range_corrections.extend(corrections);

@@ -136,10 +136,7 @@ pub fn holds<'a>(
     let mut holds: Vec<Hold<'a>> = Vec::new();
     let mut open = false;
     for record in cells.flat_map(|cell| archive.cell(cell)) {
-        let still = matches!(record.mode, Mode::Bias | Mode::Scale)
-            && !matches!(record.step, Step::None | Step::Moving)
-            && (!record.table_moving || record.step == Step::Rate);
-        if !still {
+        if !is_of_a_hold(record) {
             open = false;
             continue;
         }
@@ -158,6 +155,13 @@ pub fn holds<'a>(
         };
     }
     holds
+}
+
+/// Whether a second belongs to a hold: the table rests, or turns at its constant rate.
+pub fn is_of_a_hold(record: &AccRecord) -> bool {
+    matches!(record.mode, Mode::Bias | Mode::Scale)
+        && !matches!(record.step, Step::None | Step::Moving)
+        && (!record.table_moving || record.step == Step::Rate)
 }
 
 fn continues(hold: &Hold<'_>, record: &AccRecord) -> bool {
