@@ -42,6 +42,7 @@ pub mod series;
 pub mod solve;
 pub mod trial;
 pub mod verdict;
+mod whiteness;
 
 pub use analysis::{Analysis, Settings, analyse, diagnose};
 pub use answer::Diagnosis;

@@ -7,6 +7,7 @@ use super::open_form::{self, Said};
 use super::remains;
 use super::scene::{Axes, Scene};
 use super::search::{self, Bank, Entry, SET_MAX, Seen, Set, Weighed};
+use super::whiteness::widening;
 use crate::math::shared_work;
 
 /// Log prior odds of the open forms together; they share it.
@@ -105,7 +106,7 @@ impl Solution {
     }
 
     /// The same as far as it is proof: where what the best hypothesis leaves is louder than the noise fitted to it, at the periods at
-    /// which the hypothesis lives, its gain in likelihood is worth less by that factor.
+    /// which the hypothesis lives, or is not white, its gain in likelihood is worth less by that factor.
     pub fn proven(&self, scene: &Scene, entries: &[Entry]) -> f64 {
         let (best, statistic) = (self.best(), self.statistic());
         if best.set.members.is_empty() {
@@ -120,7 +121,8 @@ impl Solution {
         let energy: f64 = signal.iter().flatten().map(|x| x * x).sum();
         // What the set pays for its sizes, shapes and prior comes off the likelihood it gains, and stays as it is.
         let paid = (0.5 * energy - (best.set.score - best.of_flips)).max(0.0);
-        statistic - (1.0 - remains::loudness_under(&left, &scene.schedule, &signal).recip()) * (statistic + paid)
+        let louder = remains::loudness_under(&left, &scene.schedule, &signal).max(widening(&left.whitened).powi(2));
+        statistic - (1.0 - louder.recip()) * (statistic + paid)
     }
 }
 

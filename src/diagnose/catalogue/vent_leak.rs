@@ -17,38 +17,57 @@ pub const EFFECT: Effect = Effect {
     scales: SELDOM_LARGE,
     nonlinear: &[
         ONSET,
-        Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, range: [5.7, 11.5], ..Nonlinear::PLAIN },
+        Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.25, range: [5.7, 13.5], ..Nonlinear::PLAIN },
     ],
     grid,
     log_density,
     signature,
     exact_at: None,
-    assumes: Some(|scene, theta| of_a_turn(scene, theta[0])),
+    assumes: Some(|scene, theta| of_a_turn(scene, theta[0]).or_else(|| of_a_slow_one(scene, theta))),
     why: "A push fixed in the body begins at an instant no log names and dies away exponentially, whatever the attitude does.",
 };
 
-/// Time constants tried first, s, and the spacing of the onsets for each as a share of it.
-const TAUS_S: [f64; 7] = [600.0, 1200.0, 2400.0, 4800.0, 9600.0, 19_200.0, 38_400.0];
+/// Time constants tried first, s, as far as they are in the range; the spacing of the onsets for each is a share of it.
+const TAUS_S: [f64; 10] = [600.0, 1200.0, 2400.0, 4800.0, 9600.0, 19_200.0, 38_400.0, 76_800.0, 153_600.0, 307_200.0];
 
 /// Shortest and longest decay, s: faster is an event, slower is a step.
 const TAU_RANGE_S: [f64; 2] = [300.0, 80_000.0];
+/// A record that is longer than most tells slower ones from a step, up to this share of it.
+const TOLD_FROM_A_STEP: f64 = 0.45;
+/// Logarithm of a time constant from the longest up to which it may as well be longer.
+const AT_THE_LONGEST: f64 = 0.05;
+
+fn longest_s(scene: &Scene) -> f64 {
+    let [start, end] = scene.span_s();
+    TAU_RANGE_S[1].max(TOLD_FROM_A_STEP * (end - start))
+}
+
+fn of_a_slow_one(scene: &Scene, theta: &Theta) -> Option<String> {
+    let longest_s = longest_s(scene);
+    (theta[1] > longest_s.ln() - AT_THE_LONGEST).then(|| {
+        format!("tau_s is at the longest that is tried, {longest_s:.0} s, slower than which is taken for a step: it may be longer")
+    })
+}
 
 fn grid(scene: &Scene) -> Vec<Theta> {
     let points = |tau: &f64| {
         onsets(scene, (0.5 * tau).clamp(300.0, 1800.0), 600.0).into_iter().map(|t| [t, tau.ln()]).collect::<Vec<_>>()
     };
-    TAUS_S.iter().flat_map(points).collect()
+    let longest_s = longest_s(scene);
+    TAUS_S.iter().filter(|tau| **tau < 0.9 * longest_s).flat_map(points).collect()
 }
 
 fn log_density(scene: &Scene, _: &Theta) -> f64 {
     let [start, end] = scene.span_s();
-    -((end - start) * (TAU_RANGE_S[1] / TAU_RANGE_S[0]).ln()).ln()
+    -((end - start) * (longest_s(scene) / TAU_RANGE_S[0]).ln()).ln()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
     let [start, end] = scene.span_s();
-    let inside =
-        theta[0] > start && theta[0] < end - 300.0 && theta[1] > TAU_RANGE_S[0].ln() && theta[1] < TAU_RANGE_S[1].ln();
+    let inside = theta[0] > start
+        && theta[0] < end - 300.0
+        && theta[1] > TAU_RANGE_S[0].ln()
+        && theta[1] < longest_s(scene).ln();
     inside.then(|| Shape::scalar(decay(scene.clock_s(), theta[0], theta[1].exp())))
 }
 

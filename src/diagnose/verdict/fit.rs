@@ -6,10 +6,8 @@ use crate::diagnose::scene::{Axes, Scene};
 use crate::diagnose::search::{self, Set, Weighed};
 use crate::diagnose::solve::Library;
 use crate::diagnose::trial::Tried;
+use crate::diagnose::whiteness::{Coloured, coloured};
 use crate::math::rms::rms_about_mean;
-
-/// A remaining autocorrelation this unlikely makes the errors wider.
-const WHITENESS_P: f64 = 1e-3;
 
 /// Errors that all windows share are told from this share of the noise on: less does not show in a figure.
 const SHARED_TOLD: f64 = 0.25;
@@ -35,14 +33,12 @@ pub fn fit(
     };
     let used: f64 = set.members.iter().map(|m| m.linear() as f64).sum();
     let mut inflation = 1.0_f64;
-    for k in 0..3 {
-        let (p, ratio) = whiteness(&after.data.projected(k, &after));
-        if p < WHITENESS_P {
-            inflation = inflation.max(ratio.sqrt());
+    for (axis, coloured) in ["x", "y", "z"].iter().zip([0, 1, 2].map(|k| coloured(&after.data.projected(k, &after)))) {
+        if let Some(Coloured { p, widening }) = coloured {
+            inflation = inflation.max(widening);
             notes.push(format!(
-                "the whitened residual of axis {} is not white (p = {p:.1e}): errors are widened by {:.2}",
-                ["x", "y", "z"][k],
-                ratio.sqrt()
+                "the whitened residual of axis {axis} is not white (p = {p:.1e}): errors are widened by {widening:.2}, and the evidence counts \
+                 for as much less"
             ));
         }
     }
@@ -81,23 +77,4 @@ fn of_shared_errors(scene: &Scene, frame: &Frame, weighed: &Weighed, left_ng: &A
         })
     };
     (0..3).filter_map(told).collect()
-}
-
-/// Ljung-Box over twenty lags: its p value, and the statistic against what is expected.
-fn whiteness(x: &[f64]) -> (f64, f64) {
-    const LAGS: usize = 20;
-    let n = x.len() as f64;
-    let energy: f64 = x.iter().map(|v| v * v).sum();
-    let q: f64 = (1..=LAGS)
-        .map(|lag| {
-            let r: f64 = x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum::<f64>() / energy;
-            r * r / (n - lag as f64)
-        })
-        .sum::<f64>()
-        * n
-        * (n + 2.0);
-    // Wilson and Hilferty 1931: the cube root of a chi square is nearly normal.
-    let k = LAGS as f64;
-    let z = ((q / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
-    (0.5 * statrs::function::erf::erfc(z / std::f64::consts::SQRT_2), (q / k).max(1.0))
 }

@@ -1,6 +1,7 @@
 //! From weighed hypotheses to what is said: consistent, explained, ambiguous or unexplained, with its figures. It decides; what
 //! it says of a decision is in the files beside it.
 
+mod again;
 mod claims;
 mod credible;
 mod faults;
@@ -15,6 +16,7 @@ mod proportion;
 mod stands;
 mod unnamed;
 
+use self::again::again;
 use self::claims::{of_claims, of_unknown_claims, of_unknown_keys};
 use self::credible::credible;
 use self::fit::fit;
@@ -40,6 +42,7 @@ use super::scene::{Axes, Scene};
 use super::search::{Entry, Family, Member, Set, Weighed};
 use super::solve::{Library, Solution};
 use super::trial::Tried;
+use super::whiteness::widening;
 use crate::math::shared_work;
 
 /// Share of the allowed false alarms that goes to the evidence; the rest goes to what remains after it.
@@ -56,8 +59,9 @@ pub fn asked(claim: f64) -> f64 {
 const REMAINS_SHARE: f64 = 0.03;
 const REMAINS_BESIDE: f64 = 0.05;
 
-/// Share of what remains after the evidence that goes to laws of several variables.
+/// Shares of what remains after the evidence that go to laws of several variables, and to a second time of what is named.
 const JOINT_SHARE: f64 = 0.2;
+const AGAIN_SHARE: f64 = 0.1;
 
 /// Prior sizes are for weighing hypotheses. In what is told of a size they are so many times the usual, or they would draw one that is
 /// several times the usual towards it by a standard error; and bound only what the record cannot say at all.
@@ -262,7 +266,7 @@ fn of_resonances(null: &Weighed) -> Vec<String> {
 fn of_colour(lessened: f64) -> Option<String> {
     (lessened > TOLD_OF_COLOUR).then(|| {
         format!(
-            "what remains is louder than the noise fitted at the periods of the best hypothesis: {lessened:.1} of its log \
+            "what remains is louder than the noise fitted at the periods of the best hypothesis, or not white: {lessened:.1} of its log \
              evidence is no proof"
         )
     })
@@ -290,11 +294,22 @@ fn with_remains(
     let left = weighed.left(scene, &library.entries);
     let chances =
         |share: f64| move |r: Remains| Remains { probability: (proof.chances * r.probability / share).min(1.0), ..r };
-    let (asked, joint) = shared_work::both(
+    // Evidence counts for less where what is left is not white.
+    let wider = widening(&left.whitened).powi(2);
+    let lessened =
+        |r: Remains| Remains { probability: r.probability.powf(wider.recip()), energy: r.energy / wider, ..r };
+    let (asked, (joint, again)) = shared_work::both(
         || remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness, &recurring(scene)),
-        || joint::strongest(scene, &weighed.noise, &left),
+        || {
+            let named = verdict == Verdict::Explained;
+            (joint::strongest(scene, &weighed.noise, &left), named.then(|| again(scene, library, weighed)).flatten())
+        },
     );
-    let asked = [asked.map(chances(1.0 - JOINT_SHARE)), joint.map(chances(JOINT_SHARE))];
+    let asked = [
+        asked.map(chances(1.0 - JOINT_SHARE - AGAIN_SHARE)),
+        joint.map(lessened).map(chances(JOINT_SHARE)),
+        again.map(lessened).map(chances(AGAIN_SHARE)),
+    ];
     let remains = asked.into_iter().flatten().min_by(|a, b| a.probability.total_cmp(&b.probability));
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
     let rarer = if verdict == Verdict::Explained { REMAINS_BESIDE } else { 1.0 };

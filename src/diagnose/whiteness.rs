@@ -1,0 +1,47 @@
+//! Whether what a hypothesis leaves is white behind the filter of its noise. Where it is not, the noise is another one than was fitted:
+//! errors are wider, and evidence is worth less.
+
+use super::scene::Axes;
+
+/// A remaining autocorrelation this unlikely makes the errors wider.
+const WHITENESS_P: f64 = 1e-3;
+/// Lags looked at.
+const LAGS: usize = 20;
+
+/// What is not white.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coloured {
+    /// Probability that white noise has as much autocorrelation.
+    pub p: f64,
+    /// By how much errors are wider.
+    pub widening: f64,
+}
+
+/// By how much the errors of a whitened series are wider, where it is not white.
+pub fn coloured(whitened: &[f64]) -> Option<Coloured> {
+    let (p, ratio) = ljung_box(whitened);
+    (p < WHITENESS_P).then(|| Coloured { p, widening: ratio.sqrt() })
+}
+
+/// The most by which the errors of any axis are wider; 1 where all are white.
+pub fn widening(whitened: &Axes) -> f64 {
+    whitened.iter().filter_map(|x| coloured(x)).map(|coloured| coloured.widening).fold(1.0, f64::max)
+}
+
+/// Ljung-Box over twenty lags: its p value, and the statistic against what is expected.
+fn ljung_box(x: &[f64]) -> (f64, f64) {
+    let n = x.len() as f64;
+    let energy: f64 = x.iter().map(|v| v * v).sum();
+    let q: f64 = (1..=LAGS)
+        .map(|lag| {
+            let r: f64 = x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum::<f64>() / energy;
+            r * r / (n - lag as f64)
+        })
+        .sum::<f64>()
+        * n
+        * (n + 2.0);
+    // Wilson and Hilferty 1931: the cube root of a chi square is nearly normal.
+    let k = LAGS as f64;
+    let z = ((q / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
+    (0.5 * statrs::function::erf::erfc(z / std::f64::consts::SQRT_2), (q / k).max(1.0))
+}
