@@ -10,8 +10,11 @@ use utoipa::{IntoParams, ToSchema};
 use super::App;
 use super::problem::Problem;
 use super::query::{Asked, optional_clock};
+use super::records::ask;
 use crate::hub::wire::{self, BodyAxes, Gap, Time};
 use crate::pipeline::Product;
+use crate::pipeline::calibration::{Calibration, MeanError};
+use crate::pipeline::product::BodyVector;
 use crate::units::Clock;
 
 /// The latest body-axis value.
@@ -94,12 +97,25 @@ pub struct Bucket {
     pub ay_ng: Option<Spread>,
     /// Z, ng.
     pub az_ng: Option<Spread>,
-    /// Root mean square of the windows' standard errors, ng.
+    /// Root mean square of the windows' statistical standard errors, ng: of a window, and not of the mean.
     pub sigma_ax_ng: Option<f64>,
     /// Of Y.
     pub sigma_ay_ng: Option<f64>,
     /// Of Z.
     pub sigma_az_ng: Option<f64>,
+    /// Statistical standard error of the mean, ng: noise averages down, the errors of bias law and scale factor are those of all windows
+    /// together and do not. Null where a window is not by the calibration in use.
+    pub sigma_mean_ax_ng: Option<f64>,
+    /// Of Y.
+    pub sigma_mean_ay_ng: Option<f64>,
+    /// Of Z.
+    pub sigma_mean_az_ng: Option<f64>,
+    /// Systematic standard error, the same for one window and for the mean, to be added in quadrature, ng.
+    pub sigma_sys_ax_ng: Option<f64>,
+    /// Of Y.
+    pub sigma_sys_ay_ng: Option<f64>,
+    /// Of Z.
+    pub sigma_sys_az_ng: Option<f64>,
     /// Mode of its first window.
     pub mode: &'static str,
     /// Quality of the window with most reasons for care.
@@ -143,12 +159,19 @@ pub async fn history(State(app): State<Arc<App>>, Asked(span): Asked<Span>) -> R
     let (from, to) = (from.unwrap_or(first), to.unwrap_or(last));
     let products = app.hub.history(from, to);
     let buckets = in_buckets(&products, from, to, points);
+    let errors = if buckets.iter().all(|products| products.len() == 1) {
+        let alone = |products: &&[Product]| products[0].acceleration.map(|acceleration| acceleration.sigma_ng);
+        buckets.iter().map(alone).collect()
+    } else {
+        let products = products.clone();
+        ask(&app, move |station| mean_errors(station.calibration(), &in_buckets(&products, from, to, points))).await
+    };
     let picture = app.board.picture();
     let touching = picture.gaps.iter().filter(|(start, end)| *end >= from && *start <= to);
     Ok(Json(History {
         frame: "orbiter_body",
         windows: products.len(),
-        buckets: buckets.into_iter().map(|products| bucket(&app, products)).collect(),
+        buckets: buckets.into_iter().zip(errors).map(|(products, error)| bucket(&app, products, error)).collect(),
         gaps: touching.map(|(start, end)| Gap::new(&app.mission, *start, *end)).collect(),
     }))
 }
@@ -171,7 +194,15 @@ fn in_buckets(products: &[Product], from: Clock, to: Clock, points: usize) -> Ve
     products.chunk_by(|a, b| bucket_of(a) == bucket_of(b)).collect()
 }
 
-fn bucket(app: &App, products: &[Product]) -> Bucket {
+/// The standard error of each bucket's mean, where its windows are by the calibration in use.
+fn mean_errors(calibration: Option<&Calibration>, buckets: &[&[Product]]) -> Vec<Option<BodyVector>> {
+    let Some(calibration) = calibration else { return vec![None; buckets.len()] };
+    let by_it = |product: &Product| product.acceleration.is_none() || product.calibration == calibration.version;
+    let error = MeanError::new(calibration);
+    buckets.iter().map(|products| products.iter().all(by_it).then(|| error.of(products)).flatten()).collect()
+}
+
+fn bucket(app: &App, products: &[Product], error: Option<BodyVector>) -> Bucket {
     const WINDOW_TENTHS: i64 = 500;
     let (first, last) = (&products[0], &products[products.len() - 1]);
     let end = last.start.plus_tenths(WINDOW_TENTHS);
@@ -189,6 +220,11 @@ fn bucket(app: &App, products: &[Product]) -> Bucket {
         let squares: f64 = accelerations.iter().map(|a| a.sigma_ng.0[axis].powi(2)).sum();
         (n > 0).then(|| rounded((squares / n as f64).sqrt()))
     };
+    let of_mean = |axis: usize| error.map(|BodyVector(ng)| rounded(ng[axis]));
+    let systematic = |axis: usize| {
+        let sum: f64 = accelerations.iter().map(|a| a.sigma_sys_ng.0[axis]).sum();
+        (n > 0).then(|| rounded(sum / n as f64))
+    };
     let worst = products.iter().map(|product| product.quality).max_by_key(|quality| (quality.reasons(), *quality));
     Bucket {
         span: wire::Span::new(&app.mission, first.start, end),
@@ -200,6 +236,12 @@ fn bucket(app: &App, products: &[Product]) -> Bucket {
         sigma_ax_ng: sigma(0),
         sigma_ay_ng: sigma(1),
         sigma_az_ng: sigma(2),
+        sigma_mean_ax_ng: of_mean(0),
+        sigma_mean_ay_ng: of_mean(1),
+        sigma_mean_az_ng: of_mean(2),
+        sigma_sys_ax_ng: systematic(0),
+        sigma_sys_ay_ng: systematic(1),
+        sigma_sys_az_ng: systematic(2),
         mode: first.mode.word(),
         worst_quality: worst.unwrap_or_default().to_string(),
     }

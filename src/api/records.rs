@@ -27,7 +27,7 @@ pub struct AsOf {
 }
 
 /// Asks the station on a thread that may wait.
-async fn ask<T: Send + 'static>(app: &Arc<App>, question: impl FnOnce(&Station) -> T + Send + 'static) -> T {
+pub(super) async fn ask<T: Send + 'static>(app: &Arc<App>, question: impl FnOnce(&Station) -> T + Send + 'static) -> T {
     let station = app.station.clone();
     let asked = tokio::task::spawn_blocking(move || question(&station.read().expect("no holder panics")));
     asked.await.expect("a question does not panic")

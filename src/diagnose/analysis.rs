@@ -109,7 +109,12 @@ impl<'a> Prepared<'a> {
             claim: self.settings.claim_probability,
             chances: 1.0,
         };
-        let (diagnosis, model_ng, ladder) = verdict::conclude(&self.scene, &self.library, &self.solution, proof);
+        let (mut diagnosis, model_ng, ladder) = verdict::conclude(&self.scene, &self.library, &self.solution, proof);
+        if let Some(Reached { least, .. }) = reached.filter(|_| source == Source::NullTable) {
+            diagnosis.notes.push(format!(
+                "of so few replicates the bootstrap shows no probability below {least:.1e}: the table of nulls gives it"
+            ));
+        }
         Analysis { plates: plates(&self.scene, &diagnosis, &model_ng, ladder), diagnosis }
     }
 }

@@ -232,7 +232,7 @@ impl<'a> Trial<'a> {
             after_rms_ng: std::array::from_fn(|k| rms_about_mean(&after[k])),
             excess_removed: if signal_energy > 0.0 { 1.0 - missed_energy / signal_energy } else { 0.0 },
             log_score_gain: gain,
-            log_score_gain_se: Some((spread * count).sqrt()).filter(|_| count > 1.0),
+            log_score_gain_se: Some((spread * count).sqrt()).filter(|error| count > 1.0 && *error > 0.0),
         };
         let whole = self.frame.with_data(&self.signal).data;
         let is_enough = predictable > 0.0 && predictable >= SHARE * whole.dot(&whole);

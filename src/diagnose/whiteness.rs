@@ -45,3 +45,33 @@ fn ljung_box(x: &[f64]) -> (f64, f64) {
     let z = ((q / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
     (0.5 * statrs::function::erf::erfc(z / std::f64::consts::SQRT_2), (q / k).max(1.0))
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    #[test]
+    fn what_is_white_widens_nothing_and_what_keeps_a_fifth_of_itself_does() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut told = [0; 2];
+        for _ in 0..200 {
+            let white: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut rng)).collect();
+            let mut last = 0.0;
+            let follows = white.iter().map(|x| {
+                last = 0.2 * last + x;
+                last
+            });
+            let coloured_one: Vec<f64> = follows.collect();
+            told[0] += usize::from(coloured(&white).is_some());
+            told[1] += usize::from(coloured(&coloured_one).is_some_and(|coloured| coloured.widening > 1.5));
+        }
+        // One in a thousand is expected of the first.
+        assert!(told[0] <= 3, "{told:?}");
+        assert_eq!(told[1], 200);
+        assert_eq!(widening(&[vec![0.0, 1.0, -1.0], vec![1.0, -1.0, 0.0], vec![0.5, 0.1, 0.2]]), 1.0);
+    }
+}

@@ -131,30 +131,54 @@ impl BodyAxes {
     }
 }
 
-/// One window, with the names of `windows.csv`.
+/// One window of 50 s, with the names of `windows.csv`. Times are those of its beginning; `a*`, `sigma*` and `mean*` are on body axes, `q_*`,
+/// `trim_*` and `range_*` on those of the sensor, so that `range_z` belongs to `ay_ng` and `range_y` to `az_ng`.
 #[derive(Debug, Clone, PartialEq, Serialize, ToSchema)]
-#[allow(missing_docs, reason = "the names are the documentation: they are those of windows.csv")]
 pub struct Window {
+    /// Instrument clock at its beginning, s.
     pub window_start_clock_s: f64,
+    /// Mission elapsed time at its beginning, s.
     pub met_s: f64,
+    /// UTC at its beginning, by the nominal epoch.
     pub utc: String,
+    /// On body axes.
     #[serde(flatten)]
     pub acceleration: BodyAxes,
+    /// Q of the adaptive trimmed mean, sensor axis X: how heavy the tails of the samples are.
     pub q_x: Option<f64>,
+    /// As `q_x`.
     pub q_y: Option<f64>,
+    /// As `q_x`.
     pub q_z: Option<f64>,
+    /// Share of the samples trimmed at each end, sensor axis X.
     pub trim_x: Option<f64>,
+    /// As `trim_x`.
     pub trim_y: Option<f64>,
+    /// As `trim_x`.
     pub trim_z: Option<f64>,
+    /// Range of sensor axis X, as corrected.
     pub range_x: Option<&'static str>,
+    /// As `range_x`.
     pub range_y: Option<&'static str>,
+    /// As `range_x`.
     pub range_z: Option<&'static str>,
+    /// Samples that came down; 500 are whole. What is at the rail, of another range or taken while the table was away is among them, and
+    /// in no value.
     pub samples: u16,
+    /// Mean sensor temperature, C.
     pub temperature_c: Option<f64>,
+    /// What the instrument was doing.
     pub mode: &'static str,
+    /// `good`, or the reasons for care with `+` between: partial (fewer samples used than the window holds), gap (telemetry missing in it),
+    /// saturated (samples at the rail left out), range_mixed (those of the most frequent range used), range_corrected (the records named a
+    /// wrong one), table_moving (the table was away for a part of it, which was left out), uncalibrated (no value), noisy (far more scatter
+    /// than its neighbours), extrapolated (beyond the calibrations that support the bias).
     pub quality: String,
+    /// Version of the calibration it is made with; 0 is none.
     pub calibration: u32,
+    /// Hash of what it was made from and of its figures.
     pub revision: String,
+    /// Instrument clock since which it can be known: of its last record, or of its calibration where that is later.
     pub known_since_clock_s: f64,
 }
 

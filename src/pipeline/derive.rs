@@ -107,11 +107,13 @@ fn in_body_axes(axes: [Calibrated; 3]) -> BodyAcceleration {
     }
 }
 
-/// Hash of the samples and of every figure they were turned into.
+/// Hash of the samples, of every figure they were turned into, and of when that can be known: of none of them is another told under the
+/// same name.
 fn revision(window: &Window, product: &Product) -> Revision {
     let mut octets = Vec::with_capacity(128);
     octets.extend(window.hash.to_le_bytes());
     octets.extend(product.calibration.to_le_bytes());
+    octets.extend(product.known_since.tenths().to_le_bytes());
     if let Some(acceleration) = &product.acceleration {
         let vectors = [acceleration.trimmed_ng, acceleration.mean_ng, acceleration.sigma_ng, acceleration.sigma_sys_ng];
         octets.extend(vectors.iter().flat_map(|vector| vector.0).flat_map(f64::to_le_bytes));

@@ -6,6 +6,7 @@ mod dump;
 mod formula;
 mod lag;
 mod large;
+mod leaks;
 mod limits;
 mod listed;
 mod logs;

@@ -3,7 +3,8 @@
 //! Errors along one mission are correlated, so a mission's share of windows inside the band is one figure, and the spread of the
 //! pooled share comes from the missions.
 
-use oare_ground::pipeline::Settings;
+use oare_ground::pipeline::calibration::MeanError;
+use oare_ground::pipeline::{Product, Settings};
 use oare_ground::simulate::{Mission, MissionConfig};
 use oare_ground::telemetry::{Axis, Quality, Range};
 use rayon::prelude::*;
@@ -70,6 +71,25 @@ fn tally(flown: &Flown) -> Tally {
     tally
 }
 
+/// Of one mission, the share of hourly means inside two of their standard errors, body axes.
+fn hours_inside(flown: &Flown) -> [f64; 3] {
+    let error = MeanError::new(flown.derived.current().expect("a calibration"));
+    let whole = |product: &Product| product.acceleration.is_some() && product.quality.is_good();
+    let products: Vec<Product> = flown.products().filter(whole).collect();
+    let hour = |product: &Product| product.start.tenths().div_euclid(36_000);
+    [0, 1, 2].map(|i| {
+        share(products.chunk_by(|a, b| hour(a) == hour(b)).filter_map(|products| {
+            let truth = |product: &Product| {
+                flown.truth.get(&(product.start.seconds() as u32)).filter(|truth| truth.normal).map(|t| t.body_ng[i])
+            };
+            let truths = products.iter().map(truth).collect::<Option<Vec<f64>>>()?;
+            let found = products.iter().filter_map(|product| product.acceleration);
+            let missed = found.zip(truths).map(|(found, truth)| found.trimmed_ng.0[i] - truth).sum::<f64>();
+            Some((missed / products.len() as f64).abs() < 2.0 * error.of(products)?.0[i])
+        }))
+    })
+}
+
 /// Mean over missions and its standard error.
 fn mean(of: impl Iterator<Item = f64>) -> [f64; 2] {
     let values: Vec<f64> = of.collect();
@@ -116,6 +136,24 @@ fn hold(tallies: &[Tally]) {
         holds("bias", mean(tallies.iter().map(|t| t.bias[i])), of_bias);
         holds("acceleration", mean(tallies.iter().map(|t| t.acceleration[i])), 0.005);
         holds("scale", mean(tallies.iter().map(|t| t.scale[i])), of_scale);
+    }
+}
+
+/// The error of a mean over an hour is that of its law, hardly less than a window's, and holds: some fifty hours of a mission share it.
+#[test]
+fn the_error_of_an_hourly_mean_holds() {
+    let missions: Vec<[f64; 3]> = (5000..5000 + seeds(60, 16))
+        .into_par_iter()
+        .map(|seed| hours_inside(&fly(MissionConfig::sts65(seed, 36.0))))
+        .collect();
+    for i in 0..3 {
+        let [share, error] = mean(missions.iter().map(|hours| hours[i]));
+        println!(
+            "body axis {i}: {:.1} % of hourly means inside two standard errors ({:.1})",
+            100.0 * share,
+            100.0 * error
+        );
+        assert!(share > 0.95 - 0.03 - 3.0 * error.max(0.01), "axis {i}: {share:.3} +- {error:.3}");
     }
 }
 

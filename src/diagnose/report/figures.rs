@@ -107,6 +107,8 @@ fn log_strip(plates: &Plates, area: &Canvas, time: std::ops::Range<f64>) -> Resu
     kinds.sort_unstable();
     kinds.dedup();
     let rows = kinds.len().max(1) as f64;
+    // Twelve ticks of a short record are less than an hour apart.
+    let decimals = usize::from(time.end - time.start < 12.0);
     let mut chart = ChartBuilder::on(area)
         .margin_right(14)
         .x_label_area_size(36)
@@ -118,7 +120,7 @@ fn log_strip(plates: &Plates, area: &Canvas, time: std::ops::Range<f64>) -> Resu
         .y_labels(0)
         .x_labels(12)
         .x_desc("hours since lift-off")
-        .x_label_formatter(&|x| format!("{x:.0}"))
+        .x_label_formatter(&|x| format!("{x:.decimals$}"))
         .draw()
         .map_err(said)?;
     for (from, to, kind) in &plates.events {

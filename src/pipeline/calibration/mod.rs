@@ -9,6 +9,7 @@ mod apply;
 pub mod bias_law;
 mod findings;
 mod known;
+mod mean_error;
 pub mod misreport;
 pub mod noise;
 pub mod one_sided;
@@ -27,6 +28,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 pub use anomaly::{Anomaly, AnomalyKind, FALSE_PER_MISSION, RangeCorrection};
 pub use apply::{Bias, BiasLaw, Calibrated, Calibration, Measured, Provenance, Scale};
 pub use known::{KnownCalibration, KnownCalibrationError};
+pub use mean_error::MeanError;
 pub use two_position::BiasMeasurement;
 pub use version::Shift;
 
