@@ -28,14 +28,17 @@ fn beside(hours: u32, seed: u64, leaks: &[Leak]) -> Diagnosis {
 /// The catalogue's leak begins once: where it begins twice one of both is not all there is, and where the other is, is told.
 #[test]
 fn a_leak_that_opens_twice_is_not_explained_by_one() {
-    let a_ng = [60.0, -110.0, 90.0];
-    for seed in [1_250_010, 1_250_011] {
-        let once = beside(36, seed, &[Leak(0.6, a_ng, 8000.0)]);
-        assert_eq!((once.verdict, super::ids(&once)), (Verdict::Explained, vec!["vent_leak"]), "{seed}");
-        let twice = beside(36, seed, &[Leak(0.6, a_ng, 8000.0), Leak(0.2, a_ng.map(|a| 0.8 * a), 8000.0)]);
-        assert_eq!(twice.verdict, Verdict::Unexplained, "{seed}: {:?}", super::ids(&twice));
+    let seed = 1_250_025;
+    let once = beside(24, seed, &[Leak(0.6, [70.0, -140.0, 95.0], 8000.0)]);
+    assert_eq!((once.verdict, super::ids(&once)), (Verdict::Explained, vec!["vent_leak"]));
+    for leaks in [
+        [Leak(0.6, [70.0, -140.0, 95.0], 8000.0), Leak(0.2, [70.0, -140.0, 95.0], 8000.0)],
+        [Leak(0.6, [100.0, -140.0, 95.0], 5000.0), Leak(0.2, [60.0, 140.0, -95.0], 5000.0)],
+    ] {
+        let twice = beside(24, seed, &leaks);
+        assert_eq!(twice.verdict, Verdict::Unexplained, "{:?}", super::ids(&twice));
         let hypothesis = twice.hypothesis.unwrap();
-        assert!(hypothesis.formula.contains("vent_leak once more"), "{seed}: {hypothesis:?}");
+        assert!(hypothesis.formula.contains("vent_leak once more"), "{hypothesis:?}");
     }
 }
 

@@ -59,7 +59,7 @@ pub fn asked(claim: f64) -> f64 {
 const REMAINS_SHARE: f64 = 0.03;
 const REMAINS_BESIDE: f64 = 0.05;
 
-/// Shares of what remains after the evidence that go to laws of several variables, and to a second time of what is named.
+/// Shares of what remains after the evidence that go to laws of several variables, and, where something is named, to a second time of it.
 const JOINT_SHARE: f64 = 0.2;
 const AGAIN_SHARE: f64 = 0.1;
 
@@ -298,21 +298,20 @@ fn with_remains(
     let wider = widening(&left.whitened).powi(2);
     let lessened =
         |r: Remains| Remains { probability: r.probability.powf(wider.recip()), energy: r.energy / wider, ..r };
+    let named = verdict == Verdict::Explained;
+    let again_share = if named { AGAIN_SHARE } else { 0.0 };
     let (asked, (joint, again)) = shared_work::both(
         || remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness, &recurring(scene)),
-        || {
-            let named = verdict == Verdict::Explained;
-            (joint::strongest(scene, &weighed.noise, &left), named.then(|| again(scene, library, weighed)).flatten())
-        },
+        || (joint::strongest(scene, &weighed.noise, &left), named.then(|| again(scene, library, weighed)).flatten()),
     );
     let asked = [
-        asked.map(chances(1.0 - JOINT_SHARE - AGAIN_SHARE)),
+        asked.map(chances(1.0 - JOINT_SHARE - again_share)),
         joint.map(lessened).map(chances(JOINT_SHARE)),
-        again.map(lessened).map(chances(AGAIN_SHARE)),
+        again.map(lessened).map(chances(again_share)),
     ];
     let remains = asked.into_iter().flatten().min_by(|a, b| a.probability.total_cmp(&b.probability));
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
-    let rarer = if verdict == Verdict::Explained { REMAINS_BESIDE } else { 1.0 };
+    let rarer = if named { REMAINS_BESIDE } else { 1.0 };
     let allowed = rarer * (1.0 - EVIDENCE_SHARE) * proof.claim;
     let share = if verdict == Verdict::Unexplained { 1.0 } else { REMAINS_SHARE };
     let probability = remains.as_ref().map_or(1.0, |r| r.probability);
