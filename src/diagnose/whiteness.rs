@@ -17,8 +17,11 @@ pub struct Coloured {
     pub widening: f64,
 }
 
-/// By how much the errors of a whitened series are wider, where it is not white.
+/// By how much the errors of a whitened series are wider, where it is not white. Too few values do not say.
 pub fn coloured(whitened: &[f64]) -> Option<Coloured> {
+    if whitened.len() <= 2 * LAGS {
+        return None;
+    }
     let (p, ratio) = ljung_box(whitened);
     (p < WHITENESS_P).then(|| Coloured { p, widening: ratio.sqrt() })
 }
