@@ -1,6 +1,8 @@
 //! Whether what a hypothesis leaves is white behind the filter of its noise. Where it is not, the noise is another one than was fitted:
 //! errors are wider, and evidence is worth less.
 
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
 use super::scene::Axes;
 
 /// A remaining autocorrelation this unlikely makes the errors wider.
@@ -17,36 +19,26 @@ pub struct Coloured {
     pub widening: f64,
 }
 
-/// By how much the errors of a whitened series are wider, where it is not white. Too few values do not say.
+/// By how much the errors of a whitened series are wider, where it is not white, by Ljung and Box 1978. Too few values do not say.
 pub fn coloured(whitened: &[f64]) -> Option<Coloured> {
-    if whitened.len() <= 2 * LAGS {
+    let energy: f64 = whitened.iter().map(|x| x * x).sum();
+    if whitened.len() <= 2 * LAGS || energy == 0.0 {
         return None;
     }
-    let (p, ratio) = ljung_box(whitened);
-    (p < WHITENESS_P).then(|| Coloured { p, widening: ratio.sqrt() })
+    let n = whitened.len() as f64;
+    let of_lag = |lag: usize| {
+        let r = whitened.iter().zip(&whitened[lag..]).map(|(a, b)| a * b).sum::<f64>() / energy;
+        r * r / (n - lag as f64)
+    };
+    let q = n * (n + 2.0) * (1..=LAGS).map(of_lag).sum::<f64>();
+    let degrees = LAGS as f64;
+    let p = ChiSquared::new(degrees).map_or(1.0, |chi2| chi2.sf(q));
+    (p < WHITENESS_P).then(|| Coloured { p, widening: (q / degrees).sqrt() })
 }
 
 /// The most by which the errors of any axis are wider; 1 where all are white.
 pub fn widening(whitened: &Axes) -> f64 {
     whitened.iter().filter_map(|x| coloured(x)).map(|coloured| coloured.widening).fold(1.0, f64::max)
-}
-
-/// Ljung-Box over twenty lags: its p value, and the statistic against what is expected.
-fn ljung_box(x: &[f64]) -> (f64, f64) {
-    let n = x.len() as f64;
-    let energy: f64 = x.iter().map(|v| v * v).sum();
-    let q: f64 = (1..=LAGS)
-        .map(|lag| {
-            let r: f64 = x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum::<f64>() / energy;
-            r * r / (n - lag as f64)
-        })
-        .sum::<f64>()
-        * n
-        * (n + 2.0);
-    // Wilson and Hilferty 1931: the cube root of a chi square is nearly normal.
-    let k = LAGS as f64;
-    let z = ((q / k).cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt();
-    (0.5 * statrs::function::erf::erfc(z / std::f64::consts::SQRT_2), (q / k).max(1.0))
 }
 
 #[cfg(test)]

@@ -32,8 +32,11 @@ const TAUS_S: [f64; 10] = [600.0, 1200.0, 2400.0, 4800.0, 9600.0, 19_200.0, 38_4
 
 /// Shortest and longest decay, s: faster is an event, slower is a step.
 const TAU_RANGE_S: [f64; 2] = [300.0, 80_000.0];
-/// A record that is longer than most tells slower ones from a step, up to this share of it.
+/// A record that is longer than two days tells slower ones from a step, up to this share of it: in what is left of it after an onset half
+/// way one of that decays to a third.
 const TOLD_FROM_A_STEP: f64 = 0.45;
+/// Share of the longest up to which one is tried first: any nearer is found from it.
+const TRIED_FIRST: f64 = 0.9;
 /// Logarithm of a time constant from the longest up to which it may as well be longer.
 const AT_THE_LONGEST: f64 = 0.05;
 
@@ -54,7 +57,7 @@ fn grid(scene: &Scene) -> Vec<Theta> {
         onsets(scene, (0.5 * tau).clamp(300.0, 1800.0), 600.0).into_iter().map(|t| [t, tau.ln()]).collect::<Vec<_>>()
     };
     let longest_s = longest_s(scene);
-    TAUS_S.iter().filter(|tau| **tau < 0.9 * longest_s).flat_map(points).collect()
+    TAUS_S.iter().filter(|tau| **tau < TRIED_FIRST * longest_s).flat_map(points).collect()
 }
 
 fn log_density(scene: &Scene, _: &Theta) -> f64 {

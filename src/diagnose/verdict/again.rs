@@ -12,7 +12,7 @@ use crate::diagnose::search::{self, Bank, Weighed};
 use crate::diagnose::solve::{Library, quiet};
 use crate::math::rms::rms_about_mean;
 
-/// Log score of a second time, at the noise with or without a slow part, from which on it is weighed with its own noise.
+/// Log score of a second time, at the noise with or without a slow part, from which on it is weighed with its own noise: as likely as none.
 const WORTH_WEIGHING: f64 = 0.0;
 
 /// The best second time of any member with an onset, as what remains.
@@ -53,15 +53,15 @@ fn told(scene: &Scene, library: &Library, both: &Weighed, log_odds: f64) -> Opti
     let name = library.entries[second.entry].effect()?.id;
     let onset_s = second.theta[0];
     let series = set.contributions(scene, &frame, &library.entries).pop()?;
-    let amplitude = series.each_ref().map(|axis| rms_about_mean(axis));
+    let axes = remains::sharing(series.each_ref().map(|axis| rms_about_mean(axis)));
     let clock_s = scene.clock_s();
     let ends_s = clock_s.last().copied().unwrap_or(onset_s);
     Some(Remains {
         probability: (-log_odds).exp().min(1.0),
         energy: 2.0 * log_odds.max(0.0),
         form: format!("the form of {name} once more, from {onset_s:.0} s on"),
-        axis: remains::sharing(amplitude).join(", "),
-        axes: remains::sharing(amplitude),
+        axis: axes.join(", "),
+        axes,
         location: format!("it begins twice: the second time has log odds of {log_odds:.1} against none"),
         intervals: vec![Interval { start_s: onset_s, end_s: ends_s, why: format!("{name} once more") }],
         period_s: None,

@@ -149,7 +149,8 @@ pub fn usual_ng(windows: &Windows, calibration: &Calibration, known_at: Clock) -
     usual_scatter_ng(&normal(windows, known_at), &calibration.resolution_ng)
 }
 
-/// Whether a window that has its last second speaks for another range than the one reported while no correction reaches it: it is time to look for spans.
+/// Whether a window that has its last second speaks for another range than the one reported while no correction reaches it: it is time to
+/// look for spans.
 pub fn is_news(
     window: &Window,
     scatter_ng: [f64; 3],
