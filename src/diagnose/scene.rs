@@ -6,7 +6,7 @@
 mod angles;
 
 use std::ops::Deref;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::math::shared_work;
 use crate::physics::{self, Mat3, Vec3};
@@ -86,6 +86,7 @@ pub struct Scene<'a> {
     pub measurement: Measurement,
     /// The sensor temperature with what its cycles tell of it before the ancillary grid.
     pub temperature_and_earlier: Arc<earlier::Series>,
+    lever_arms_ng: OnceLock<Arc<[Axes; 3]>>,
     surroundings: Arc<Surroundings>,
 }
 
@@ -246,6 +247,7 @@ impl<'a> Scene<'a> {
                 &surroundings.temperature_c,
                 surroundings.period_s,
             )),
+            lever_arms_ng: OnceLock::new(),
             surroundings,
             case,
         }
@@ -289,6 +291,14 @@ impl<'a> Scene<'a> {
     /// Tensor T of a = T r: what a sensor offset of one metre feels, 1/s^2, at grid point `i`, body axes.
     pub fn tensor_s2(&self, i: usize) -> Mat3 {
         self.rotation_s2(i) - self.gradient_s2(i)
+    }
+
+    /// What a sensor offset of one metre along each body axis feels, measured, ng.
+    pub fn lever_arms_ng(&self) -> &[Axes; 3] {
+        self.lever_arms_ng.get_or_init(|| {
+            let arm = |axis: usize| self.measure(|i| self.tensor_s2(i).column(axis) / NANO_G_M_S2);
+            Arc::new(std::array::from_fn(arm))
+        })
     }
 
     /// Gravity gradient G in body axes, 1/s^2.

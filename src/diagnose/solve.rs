@@ -23,10 +23,13 @@ const OWN_NOISE_QUIET: [usize; 2] = [3, 2];
 const QUIET_SHARE: f64 = 0.04;
 const QUIET_TAU_S: f64 = 3000.0;
 
-/// Log score of an effect alone, a signal-to-noise ratio of some seventeen, from which what an onset misses by half the spacing of its
-/// starting points (450 s) outweighs what another effect costs; and how many are refined at once.
+/// Log score of an effect alone, a signal-to-noise ratio of some seventeen, from which what it misses half way between its starting points
+/// (an onset by 450 s, a wind by half a right angle) outweighs what another effect costs; and how many are refined at once.
 const SHARP: f64 = 150.0;
 const SHARP_MAX: usize = 3;
+/// Sets refined of those that grow from nothing and from the plain ones, and of those that come of the best by exchange.
+const POLISHED: usize = 8;
+const EXCHANGED: usize = 4;
 
 /// Log score below the best at one noise up to which a set is weighed whatever the next noise makes of it, several times the one by which
 /// a leak and a step were apart that needed it; and how many such sets, each as dear as any that is weighed.
@@ -50,10 +53,10 @@ pub struct Library {
 impl Library {
     /// The whole catalogue but the ids of `without`, and the dictionary.
     pub fn new(scene: &Scene, without: &[String]) -> Self {
-        let allowed: Vec<&'static Effect> =
-            catalogue::ALL.iter().filter(|e| !without.iter().any(|id| id == e.id)).copied().collect();
+        let all = catalogue::ALL.iter().map(|effect| (*effect, 0.0)).chain(catalogue::SELDOM.iter().copied());
+        let allowed: Vec<(&'static Effect, f64)> = all.filter(|(e, _)| !without.iter().any(|id| id == e.id)).collect();
         let (entries, dictionary) = shared_work::both(
-            || shared_work::map(&allowed, |effect| Entry::listed(scene, effect)),
+            || shared_work::map(&allowed, |(effect, likelier)| Entry::listed(scene, effect, *likelier)),
             || open_form::dictionary(scene),
         );
         let mut entries: Vec<Entry> = entries.into_iter().flatten().collect();
@@ -233,7 +236,16 @@ impl Pool {
         if stop() {
             return None;
         }
-        polish(scene, frame, entries, &mut listed, 8);
+        polish(scene, frame, entries, &mut listed, POLISHED);
+        let mut exchanged = exchanged(frame, entries, seen, &listed_ids, &listed);
+        if !exchanged.is_empty() {
+            polish(scene, frame, entries, &mut exchanged, EXCHANGED);
+            listed.extend(exchanged);
+            search::distinct(&mut listed);
+        }
+        if stop() {
+            return None;
+        }
         let mut seeds = vec![Set::default()];
         seeds.extend(listed.iter().take(2).cloned());
         let mut opens: Vec<Set> = Vec::new();
@@ -287,12 +299,31 @@ impl Pool {
     }
 }
 
+/// The best set with one of its members given up for others, two at most, where it is so plain that its near relations keep those out of
+/// what grows: what one term of three coefficients explains may be two terms that have one each.
+fn exchanged(frame: &Frame, entries: &[Entry], seen: &Seen, listed_ids: &[usize], found: &[Set]) -> Vec<Set> {
+    let Some(best) = found.first().filter(|set| set.score > SHARP && (2..SET_MAX).contains(&set.members.len())) else {
+        return Vec::new();
+    };
+    let without = |i: usize| {
+        let mut set = best.without(i);
+        set.weigh(frame, entries);
+        set
+    };
+    let size = best.members.len();
+    let mut others = search::grow(frame, seen, listed_ids, (0..size).map(without).collect(), size + 1);
+    others.retain(|set| set.members.len() >= size && !found.iter().any(|other| other.key() == set.key()));
+    search::distinct(&mut others);
+    others
+}
+
 /// Single effects so plain that what their starting points miss them by is taken for others: refined before they grow.
 fn sharp(scene: &Scene, frame: &Frame, entries: &[Entry], seen: &Seen, listed_ids: &[usize]) -> Vec<Set> {
     let nothing = Set::default();
     let chosen = nothing.chosen(frame);
-    let refines =
-        |i: &&usize| entries[**i].effect().is_some_and(|effect| effect.nonlinear.iter().any(|p| p.step > 0.0));
+    let refines = |i: &&usize| {
+        entries[**i].effect().is_some_and(|e| e.exact_at.is_some() || e.nonlinear.iter().any(|p| p.step > 0.0))
+    };
     let ids: Vec<usize> = listed_ids.iter().filter(refines).copied().collect();
     let alone = shared_work::map(&ids, |i| search::best_of_entry(seen, *i, &chosen));
     let mut sharp: Vec<Set> = alone

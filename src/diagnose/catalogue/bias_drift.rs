@@ -14,7 +14,7 @@ pub const EFFECT: Effect = Effect {
     mistaken_for: &["vent_leak", "temperature_bias", "a trend of density"],
     linear: &push(150.0, 20000.0),
     scales: SELDOM_LARGE,
-    nonlinear: &[Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.2, range: [7.6, 13.5], ..Nonlinear::PLAIN }],
+    nonlinear: &[Nonlinear { name: "tau_s", unit: "s", log: true, step: 0.2, range: [6.8, 13.5], ..Nonlinear::PLAIN }],
     grid,
     log_density,
     signature,
@@ -23,11 +23,11 @@ pub const EFFECT: Effect = Effect {
     why: "The bias of each sensor axis relaxes from the beginning of the record with one time constant, whatever the attitude does.",
 };
 
-/// Shortest and longest time constant, s.
-const TAU_RANGE_S: [f64; 2] = [3000.0, 500_000.0];
+/// Shortest and longest time constant, s: what is switched on settles within a quarter of an hour or more.
+const TAU_RANGE_S: [f64; 2] = [900.0, 500_000.0];
 
 fn grid(_: &Scene) -> Vec<Theta> {
-    [4000.0_f64, 7000.0, 12_000.0, 20_000.0, 35_000.0, 60_000.0, 120_000.0, 300_000.0]
+    [1100.0_f64, 2000.0, 4000.0, 7000.0, 12_000.0, 20_000.0, 35_000.0, 60_000.0, 120_000.0, 300_000.0]
         .map(|tau| [tau.ln(), 0.0])
         .to_vec()
 }

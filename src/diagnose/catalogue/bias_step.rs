@@ -1,6 +1,6 @@
 //! The bias steps at an instant and stays.
 
-use super::{Effect, ONSET, SELDOM_LARGE, Shape, Theta, in_sensor, onsets, push};
+use super::{Effect, ONSET, SELDOM_LARGE, Shape, Theta, anywhere, in_sensor, onsets, push};
 use crate::diagnose::instants::of_a_turn;
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
@@ -17,7 +17,7 @@ pub const EFFECT: Effect = Effect {
     scales: SELDOM_LARGE,
     nonlinear: &[ONSET],
     grid,
-    log_density,
+    log_density: anywhere,
     signature,
     exact_at: None,
     assumes: Some(|scene, theta| of_a_turn(scene, theta[0])),
@@ -26,11 +26,6 @@ pub const EFFECT: Effect = Effect {
 
 fn grid(scene: &Scene) -> Vec<Theta> {
     onsets(scene, 900.0, 900.0).into_iter().map(|t| [t, 0.0]).collect()
-}
-
-fn log_density(scene: &Scene, _: &Theta) -> f64 {
-    let [start, end] = scene.span_s();
-    -(end - start).ln()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {

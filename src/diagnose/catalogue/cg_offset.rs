@@ -1,7 +1,5 @@
 //! The sensor is elsewhere than assumed: a = T dr, T = -G + [w x][w x] + [dw/dt x].
 
-use crate::units::NANO_G_M_S2;
-
 use super::{Effect, Linear, Shape, USUAL_OR_SMALL, full, no_density, one_point};
 use crate::diagnose::scene::Scene;
 
@@ -29,8 +27,7 @@ pub const EFFECT: Effect = Effect {
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {
-    let column = |axis: usize| full(scene.measure(|i| scene.tensor_s2(i).column(axis) / NANO_G_M_S2));
-    Some(Shape::Columns((0..3).map(column).collect()))
+    Some(Shape::Columns(scene.lever_arms_ng().iter().cloned().map(full).collect()))
 }
 
 #[cfg(test)]

@@ -1,11 +1,9 @@
-//! The centre of gravity steps at a logged change of mass: a = T dr after the event, in the pattern of T only.
+//! The centre of gravity steps at a change of mass: a = T dr after the event, in the pattern of T only. Nearly always the log has it.
 
-use crate::units::NANO_G_M_S2;
-
-use super::{Effect, Linear, Nonlinear, Shape, Theta, USUAL_OR_SMALL, no_density};
+use super::{Effect, Linear, Nonlinear, ONSET, Shape, Theta, USUAL_OR_SMALL, anywhere, no_density, onsets};
 use crate::diagnose::design::Raw;
 use crate::diagnose::measure::decay;
-use crate::diagnose::scene::Scene;
+use crate::diagnose::scene::{Axes, Scene};
 
 /// The entry.
 pub const EFFECT: Effect = Effect {
@@ -30,6 +28,24 @@ pub const EFFECT: Effect = Effect {
     why: "The residual begins at a logged change of mass and follows the gravity-gradient and rotation tensor from there on: the centre of gravity moved.",
 };
 
+/// The same at an instant that no log names.
+pub const UNLOGGED: Effect = Effect {
+    nonlinear: &[ONSET],
+    grid: |scene| onsets(scene, UNLOGGED_SPACING_S, 900.0).into_iter().map(|t| [t, 0.0]).collect(),
+    log_density: anywhere,
+    assumes: Some(|_, theta| {
+        Some(format!(
+            "the log has no change of mass at {:.0} s, where it is fitted: one is taken for forgotten",
+            theta[0]
+        ))
+    }),
+    why: "The residual begins at an instant no log names and follows the gravity-gradient and rotation tensor from there on, as it does where the centre of gravity moves.",
+    ..EFFECT
+};
+
+/// Spacing of the instants tried first, s: the tensor changes with the attitude, over a good part of an orbit.
+const UNLOGGED_SPACING_S: f64 = 1800.0;
+
 fn grid(scene: &Scene) -> Vec<Theta> {
     let [start, end] = scene.span_s();
     let inside = |t: &f64| *t > start + 600.0 && *t < end - 600.0;
@@ -45,12 +61,13 @@ fn grid(scene: &Scene) -> Vec<Theta> {
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
+    let [start, end] = scene.span_s();
     let after = decay(scene.clock_s(), theta[0], f64::INFINITY);
-    let column = |axis: usize| -> Raw {
-        let measured = scene.measure(|i| scene.tensor_s2(i).column(axis) / NANO_G_M_S2);
-        measured.map(|series| Some(series.iter().zip(&after).map(|(a, s)| a * s).collect()))
+    let from_then_on = |arm: &Axes| -> Raw {
+        arm.each_ref().map(|series| Some(series.iter().zip(&after).map(|(a, s)| a * s).collect()))
     };
-    Some(Shape::Columns((0..3).map(column).collect()))
+    (theta[0] > start + 300.0 && theta[0] < end - 300.0)
+        .then(|| Shape::Columns(scene.lever_arms_ng().iter().map(from_then_on).collect()))
 }
 
 #[cfg(test)]

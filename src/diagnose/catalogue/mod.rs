@@ -56,6 +56,10 @@ pub const ALL: &[&Effect] = &[
     &time_offset::EFFECT,
 ];
 
+/// Effects of [`ALL`] under circumstances that are rarer by so much (as a log): by more than what two rivals may be apart, so that none
+/// is a rival of what it imitates.
+pub const SELDOM: &[(&Effect, f64)] = &[(&mass_shift::UNLOGGED, -6.0)];
+
 /// The effect of an id.
 pub fn by_id(id: &str) -> Option<&'static Effect> {
     ALL.iter().find(|e| e.id == id).copied()
@@ -340,6 +344,12 @@ pub const fn push(size_ng: f64, size_max_ng: f64) -> [Linear; 3] {
 
 /// An unlogged instant at which something begins.
 pub const ONSET: Nonlinear = Nonlinear { name: "onset_s", unit: "s", step: 300.0, jagged: true, ..Nonlinear::PLAIN };
+
+/// The density of an onset that is as likely anywhere in the record.
+pub fn anywhere(scene: &Scene, _: &Theta) -> f64 {
+    let [start, end] = scene.span_s();
+    -(end - start).ln()
+}
 
 /// Onsets at a spacing inside the record, away from its ends by `margin_s`.
 pub fn onsets(scene: &Scene, spacing_s: f64, margin_s: f64) -> Vec<f64> {

@@ -31,14 +31,14 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// A catalogue effect, `None` where the case does not allow it.
-    pub fn listed(scene: &Scene, effect: &'static Effect) -> Option<Self> {
+    /// A catalogue effect so much (as a log) likelier than any is, `None` where the case does not allow it.
+    pub fn listed(scene: &Scene, effect: &'static Effect, likelier: f64) -> Option<Self> {
         let grid = (effect.grid)(scene);
         let at = |theta: &Theta| (effect.signature)(scene, theta).map(|shape| (*theta, shape));
         let points: Vec<(Theta, Shape)> = shared_work::map(&grid, at).into_iter().flatten().collect();
         (!points.is_empty()).then(|| Self {
             family: Family::Listed(effect),
-            log_prior: LOG_PRIOR,
+            log_prior: LOG_PRIOR + likelier,
             log_shares: log_shares(scene, effect, &points),
             points,
             sizes: effect.linear.iter().map(|l| l.prior().size).collect(),

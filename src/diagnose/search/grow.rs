@@ -102,8 +102,10 @@ pub fn grow(frame: &Frame, seen: &Seen, allowed: &[usize], seeds: Vec<Set>, size
 /// Every set of a beam with every entry of `allowed` that it may have, in that order.
 fn grown(frame: &Frame, seen: &Seen, allowed: &[usize], beam: &[Set], size_max: usize) -> Vec<Set> {
     let choices = Choices::new(shared_work::map(beam, |set| set.chosen(frame)));
+    let effect_of = |index: usize| seen.bank.entries[index].effect().map(|effect| effect.id);
+    let differ = |a: usize, b: usize| a != b && (effect_of(a).is_none() || effect_of(a) != effect_of(b));
     let may_have =
-        |set: &Set, index: usize| set.members.len() < size_max && set.members.iter().all(|m| m.entry != index);
+        |set: &Set, index: usize| set.members.len() < size_max && set.members.iter().all(|m| differ(m.entry, index));
     let tasks: Vec<(usize, usize)> = allowed
         .iter()
         .flat_map(|index| (0..seen.alone[*index].len()).step_by(POINTS_AT_ONCE).map(move |first| (*index, first)))
