@@ -51,7 +51,7 @@ impl<'a> Bootstrap<'a> {
     /// Replicates of `noise` at the windows of a scene, to be compared with a statistic.
     pub fn new(scene: &'a Scene<'a>, library: &'a Library, noise: [AxisNoise; 3], seed: u64, asked: f64) -> Self {
         let frame = Frame::new(&noise, &scene.schedule, &scene.loudness, &scene.residual_ng);
-        let bank = Bank::new(&frame, &library.entries);
+        let bank = Bank::new(&frame, library.searched());
         Self { scene, library, noise, seed, frame, bank, asked }
     }
 
@@ -116,7 +116,7 @@ impl<'a> Bootstrap<'a> {
         let nothing = Set::default();
         let chosen = nothing.chosen(&frame);
         let seen = self.bank.before(&frame.data);
-        (0..self.library.entries.len())
+        (0..self.library.searched().len())
             .map(|i| search::best_of_entry(&seen, i, &chosen).0)
             .fold(f64::NEG_INFINITY, f64::max)
     }

@@ -37,6 +37,7 @@ pub mod remains;
 pub mod report;
 pub mod scene;
 pub mod search;
+mod seldom;
 pub mod separating;
 pub mod series;
 pub mod solve;

@@ -7,6 +7,7 @@ use super::open_form::{self, Said};
 use super::remains;
 use super::scene::{Axes, Scene};
 use super::search::{self, Bank, Entry, SET_MAX, Seen, Set, Weighed};
+use super::seldom;
 use super::whiteness::widening;
 use crate::math::shared_work;
 
@@ -42,10 +43,12 @@ const SEARCHES_MAX: usize = 4;
 
 /// What a search needs beside the scene, made once a case.
 pub struct Library {
-    /// Listed entries, then open ones.
+    /// Listed entries, then open ones, then those that are rarer, without starting points.
     pub entries: Vec<Entry>,
     /// How many are listed.
     pub listed: usize,
+    /// How many are listed or open.
+    searched: usize,
     /// What is said of the open forms.
     pub forms: Vec<Said>,
 }
@@ -53,10 +56,11 @@ pub struct Library {
 impl Library {
     /// The whole catalogue but the ids of `without`, and the dictionary.
     pub fn new(scene: &Scene, without: &[String]) -> Self {
-        let all = catalogue::ALL.iter().map(|effect| (*effect, 0.0)).chain(catalogue::SELDOM.iter().copied());
-        let allowed: Vec<(&'static Effect, f64)> = all.filter(|(e, _)| !without.iter().any(|id| id == e.id)).collect();
+        let allowed = |effects: &[&'static Effect]| -> Vec<&'static Effect> {
+            effects.iter().filter(|e| !without.iter().any(|id| id == e.id)).copied().collect()
+        };
         let (entries, dictionary) = shared_work::both(
-            || shared_work::map(&allowed, |(effect, likelier)| Entry::listed(scene, effect, *likelier)),
+            || shared_work::map(&allowed(catalogue::ALL), |effect| Entry::listed(scene, effect)),
             || open_form::dictionary(scene),
         );
         let mut entries: Vec<Entry> = entries.into_iter().flatten().collect();
@@ -67,12 +71,30 @@ impl Library {
             entries.push(Entry::open(i, atom.shapes, share));
             forms.push(atom.said);
         }
-        Self { entries, listed, forms }
+        let searched = entries.len();
+        entries.extend(allowed(catalogue::SELDOM).into_iter().map(Entry::without_points));
+        Self { entries, listed, searched, forms }
+    }
+
+    /// The entries that are searched, at all their starting points.
+    pub fn searched(&self) -> &[Entry] {
+        &self.entries[..self.searched]
+    }
+
+    /// Places of those that are rarer.
+    pub fn seldom(&self) -> std::ops::Range<usize> {
+        self.searched..self.entries.len()
+    }
+
+    /// The rarer one at this place, with its starting points.
+    pub fn seldom_at(&self, scene: &Scene, index: usize) -> Option<Entry> {
+        let effect = self.entries[index].effect().filter(|_| self.seldom().contains(&index))?;
+        Entry::seldom(scene, effect)
     }
 
     /// Whether a set holds an open form.
     pub fn is_open(&self, set: &Set) -> bool {
-        set.members.iter().any(|m| m.entry >= self.listed)
+        set.members.iter().any(|m| self.entries[m.entry].effect().is_none())
     }
 }
 
@@ -175,6 +197,11 @@ fn solve_from(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3], stop
     let (more_listed, more_open) = more?;
     merge(&mut listed, more_listed);
     merge(&mut open, more_open);
+    let is_anything = |w: &Weighed| w.log_posterior > null.log_posterior;
+    if listed.iter().chain(&open).any(is_anything) && !stop() {
+        let seldom = seldom::found(scene, library, &listed);
+        merge(&mut listed, seldom);
+    }
     lessen(scene, entries, &mut listed, stop)?;
     Some(Solution { listed, open, null, singles, strongest })
 }
@@ -193,7 +220,7 @@ pub fn quiet(noise: &[AxisNoise; 3]) -> Option<[AxisNoise; 3]> {
 fn quietly(scene: &Scene, library: &Library, noise_null: &[AxisNoise; 3], stop: Stop) -> Option<Kinds> {
     let Some(quiet) = quiet(noise_null) else { return Some(Kinds::default()) };
     let frame = Frame::new(&quiet, &scene.schedule, &scene.loudness, &scene.residual_ng);
-    let bank = Bank::new(&frame, &library.entries);
+    let bank = Bank::new(&frame, library.searched());
     let pool = Pool::found(scene, library, &frame, &bank.before(&frame.data), quiet, stop)?;
     pool.weigh(scene, &library.entries, OWN_NOISE_QUIET, stop)
 }
@@ -225,7 +252,7 @@ impl Pool {
         }
         let entries = &library.entries;
         let listed_ids: Vec<usize> = (0..library.listed).collect();
-        let open_ids: Vec<usize> = (library.listed..entries.len()).collect();
+        let open_ids: Vec<usize> = (library.listed..library.searched).collect();
         let mut listed = search::grow(frame, seen, &listed_ids, vec![Set::default()], SET_MAX);
         let sharp = sharp(scene, frame, entries, seen, &listed_ids);
         if !sharp.is_empty() {
@@ -356,12 +383,12 @@ fn converged(scene: &Scene, library: &Library, noise_null: &[AxisNoise; 3], stop
     let mut before: Vec<Set> = Vec::new();
     for round in 0.. {
         let frame = Frame::new(&noise, &scene.schedule, &scene.loudness, &scene.residual_ng);
-        let bank = Bank::new(&frame, entries);
+        let bank = Bank::new(&frame, library.searched());
         let seen = bank.before(&frame.data);
         if round == 0 {
             let nothing = Set::default();
             let chosen = nothing.chosen(&frame);
-            let ids: Vec<usize> = (0..entries.len()).collect();
+            let ids: Vec<usize> = (0..library.searched).collect();
             let singles = shared_work::map(&ids, |i| (*i, search::best_of_entry(&seen, *i, &chosen).0));
             let best = singles.iter().copied().reduce(|a, b| if b.1 > a.1 { b } else { a });
             let strongest = best.map_or_else(Set::default, |(i, _)| {

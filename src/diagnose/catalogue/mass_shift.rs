@@ -31,7 +31,7 @@ pub const EFFECT: Effect = Effect {
 /// The same at an instant that no log names.
 pub const UNLOGGED: Effect = Effect {
     nonlinear: &[ONSET],
-    grid: |scene| onsets(scene, UNLOGGED_SPACING_S, 900.0).into_iter().map(|t| [t, 0.0]).collect(),
+    grid: unlogged,
     log_density: anywhere,
     assumes: Some(|_, theta| {
         Some(format!(
@@ -43,8 +43,15 @@ pub const UNLOGGED: Effect = Effect {
     ..EFFECT
 };
 
-/// Spacing of the instants tried first, s: the tensor changes with the attitude, over a good part of an orbit.
-const UNLOGGED_SPACING_S: f64 = 1800.0;
+/// Spacing of the instants tried first, s: half of it is hardly anything of what it is felt for; and their number at most.
+const UNLOGGED_SPACING_S: f64 = 3600.0;
+const UNLOGGED_MAX: f64 = 100.0;
+
+fn unlogged(scene: &Scene) -> Vec<Theta> {
+    let [start, end] = scene.span_s();
+    let spacing_s = UNLOGGED_SPACING_S.max((end - start) / UNLOGGED_MAX);
+    onsets(scene, spacing_s, 900.0).into_iter().map(|t| [t, 0.0]).collect()
+}
 
 fn grid(scene: &Scene) -> Vec<Theta> {
     let [start, end] = scene.span_s();

@@ -56,9 +56,8 @@ pub const ALL: &[&Effect] = &[
     &time_offset::EFFECT,
 ];
 
-/// Effects of [`ALL`] under circumstances that are rarer by so much (as a log): by more than what two rivals may be apart, so that none
-/// is a rival of what it imitates.
-pub const SELDOM: &[(&Effect, f64)] = &[(&mass_shift::UNLOGGED, -6.0)];
+/// Effects of [`ALL`] under circumstances that are rarer, looked for where something is found that may be one of them.
+pub const SELDOM: &[&Effect] = &[&mass_shift::UNLOGGED];
 
 /// The effect of an id.
 pub fn by_id(id: &str) -> Option<&'static Effect> {

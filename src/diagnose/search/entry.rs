@@ -5,6 +5,9 @@ use crate::diagnose::open_form::SIZE_NG;
 use crate::diagnose::scene::Scene;
 use crate::math::shared_work;
 
+/// Log odds of circumstances that are rarer: by more than what two rivals may be apart, so that none is a rival of what it imitates.
+const LOG_SELDOM: f64 = -6.0;
+
 /// What a family is.
 #[derive(Clone, Copy)]
 pub enum Family {
@@ -31,19 +34,34 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// A catalogue effect so much (as a log) likelier than any is, `None` where the case does not allow it.
-    pub fn listed(scene: &Scene, effect: &'static Effect, likelier: f64) -> Option<Self> {
+    /// A catalogue effect, `None` where the case does not allow it.
+    pub fn listed(scene: &Scene, effect: &'static Effect) -> Option<Self> {
         let grid = (effect.grid)(scene);
         let at = |theta: &Theta| (effect.signature)(scene, theta).map(|shape| (*theta, shape));
         let points: Vec<(Theta, Shape)> = shared_work::map(&grid, at).into_iter().flatten().collect();
         (!points.is_empty()).then(|| Self {
-            family: Family::Listed(effect),
-            log_prior: LOG_PRIOR + likelier,
+            log_prior: LOG_PRIOR,
             log_shares: log_shares(scene, effect, &points),
             points,
+            ..Self::without_points(effect)
+        })
+    }
+
+    /// An effect under circumstances that are rarer.
+    pub fn seldom(scene: &Scene, effect: &'static Effect) -> Option<Self> {
+        Self::listed(scene, effect).map(|entry| Self { log_prior: LOG_PRIOR + LOG_SELDOM, ..entry })
+    }
+
+    /// The same without its starting points, to hold its place among others.
+    pub fn without_points(effect: &'static Effect) -> Self {
+        Self {
+            family: Family::Listed(effect),
+            log_prior: LOG_PRIOR + LOG_SELDOM,
+            points: Vec::new(),
+            log_shares: Vec::new(),
             sizes: effect.linear.iter().map(|l| l.prior().size).collect(),
             means: effect.linear.iter().map(|l| l.prior().mean).collect(),
-        })
+        }
     }
 
     /// An open form.

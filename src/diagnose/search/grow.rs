@@ -1,6 +1,6 @@
 //! Sets grown in a beam: every entry at every point beside every set that may have it.
 
-use super::{BEAM, Entry, FINALISTS, Family, Member, Seen, Set, crowd, distinct};
+use super::{BEAM, Entry, FINALISTS, Family, Member, Seen, Set, distinct};
 use crate::diagnose::catalogue::{Scale, Shape};
 use crate::diagnose::design::{Choices, Chosen, Frame, Normal};
 use crate::math::shared_work;
@@ -102,10 +102,8 @@ pub fn grow(frame: &Frame, seen: &Seen, allowed: &[usize], seeds: Vec<Set>, size
 /// Every set of a beam with every entry of `allowed` that it may have, in that order.
 fn grown(frame: &Frame, seen: &Seen, allowed: &[usize], beam: &[Set], size_max: usize) -> Vec<Set> {
     let choices = Choices::new(shared_work::map(beam, |set| set.chosen(frame)));
-    let effect_of = |index: usize| seen.bank.entries[index].effect().map(|effect| effect.id);
-    let differ = |a: usize, b: usize| a != b && (effect_of(a).is_none() || effect_of(a) != effect_of(b));
     let may_have =
-        |set: &Set, index: usize| set.members.len() < size_max && set.members.iter().all(|m| differ(m.entry, index));
+        |set: &Set, index: usize| set.members.len() < size_max && set.members.iter().all(|m| m.entry != index);
     let tasks: Vec<(usize, usize)> = allowed
         .iter()
         .flat_map(|index| (0..seen.alone[*index].len()).step_by(POINTS_AT_ONCE).map(move |first| (*index, first)))
@@ -135,11 +133,7 @@ fn grown(frame: &Frame, seen: &Seen, allowed: &[usize], beam: &[Set], size_max: 
             }
             let all: Vec<Way> = all.iter().flat_map(|ways| ways[choice].iter().copied()).collect();
             let (gain, member) = best_way(seen, index, &all);
-            let mut grown = Set::clone(set);
-            grown.members.push(member);
-            grown.members.sort_by_key(|m| m.entry);
-            grown.score = set.score + gain + crowd(grown.members.len()) - crowd(set.members.len());
-            sets.push(grown);
+            sets.push(Set::clone(set).joined_by(member, gain));
         }
     }
     sets

@@ -177,6 +177,15 @@ impl Set {
         set
     }
 
+    /// The set and one member more, by which so much log score is gained.
+    pub fn joined_by(mut self, member: Member, gain: f64) -> Set {
+        let before = self.members.len();
+        self.members.push(member);
+        self.members.sort_by_key(|m| m.entry);
+        self.score += gain + crowd(before + 1) - crowd(before);
+        self
+    }
+
     /// Log evidence and priors at the noise of the frame.
     pub fn weigh(&mut self, frame: &Frame, entries: &[Entry]) {
         let priors: f64 = self.members.iter().map(|m| entries[m.entry].log_prior + m.log_occam).sum();

@@ -34,7 +34,8 @@ fn found_at(scene: &Scene, library: &Library, weighed: &Weighed, noise: &[AxisNo
         effect.is_some_and(|effect| effect.nonlinear.iter().any(|parameter| parameter.name == "onset_s"))
     };
     let twice = |index: usize| {
-        let bank = Bank::new(&frame, from_ref(&library.entries[index]));
+        let seldom = library.seldom_at(scene, index);
+        let bank = Bank::new(&frame, from_ref(seldom.as_ref().unwrap_or(&library.entries[index])));
         let (gain, mut second) = search::best_of_entry(&bank.before(&frame.data), 0, &chosen);
         (gain > WORTH_WEIGHING).then(|| {
             let mut both = set.clone();

@@ -3,7 +3,6 @@
 
 use super::Best;
 use super::named::parts;
-use crate::diagnose::catalogue::LOG_PRIOR;
 use crate::diagnose::search::{self, Bank};
 use crate::diagnose::separating::{Part, Rival};
 use crate::diagnose::solve::Library;
@@ -26,8 +25,7 @@ pub fn imitators(library: &Library, best: &Best) -> Vec<Rival> {
         if chosen.left_in(&whole).0 < SAME_SNR * SAME_SNR {
             continue;
         }
-        let usual = |index: &usize| library.entries[*index].log_prior >= LOG_PRIOR;
-        for index in (0..library.listed).filter(usual).filter(|index| !key.contains(index)) {
+        for index in (0..library.listed).filter(|index| !key.contains(index)) {
             let imitation = search::imitation(&seen, index, &chosen, &whole);
             if let Some((effect, imitation)) = imitation.filter(|(_, imitation)| imitation.left_snr < SAME_SNR) {
                 let mut rival = parts.clone();
