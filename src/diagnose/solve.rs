@@ -1,6 +1,6 @@
 //! From a scene to weighed hypotheses: nothing, listed sets, and sets with an open form. It still decides nothing.
 
-use super::catalogue::{self, Effect};
+use super::catalogue::{self, Effect, Seldom};
 use super::design::Frame;
 use super::noise::AxisNoise;
 use super::open_form::{self, Said};
@@ -51,16 +51,18 @@ pub struct Library {
     searched: usize,
     /// What is said of the open forms.
     pub forms: Vec<Said>,
+    /// Those that are rarer, in their order.
+    seldom: Vec<&'static Seldom>,
 }
 
 impl Library {
     /// The whole catalogue but the ids of `without`, and the dictionary.
     pub fn new(scene: &Scene, without: &[String]) -> Self {
-        let allowed = |effects: &[&'static Effect]| -> Vec<&'static Effect> {
-            effects.iter().filter(|e| !without.iter().any(|id| id == e.id)).copied().collect()
-        };
+        let is_allowed = |effect: &Effect| !without.iter().any(|id| id == effect.id);
+        let allowed: Vec<&'static Effect> =
+            catalogue::ALL.iter().filter(|effect| is_allowed(effect)).copied().collect();
         let (entries, dictionary) = shared_work::both(
-            || shared_work::map(&allowed(catalogue::ALL), |effect| Entry::listed(scene, effect)),
+            || shared_work::map(&allowed, |effect| Entry::listed(scene, effect)),
             || open_form::dictionary(scene),
         );
         let mut entries: Vec<Entry> = entries.into_iter().flatten().collect();
@@ -72,8 +74,10 @@ impl Library {
             forms.push(atom.said);
         }
         let searched = entries.len();
-        entries.extend(allowed(catalogue::SELDOM).into_iter().map(Entry::without_points));
-        Self { entries, listed, searched, forms }
+        let mut seldom: Vec<&'static Seldom> = catalogue::SELDOM.iter().collect();
+        seldom.retain(|s| is_allowed(s.effect));
+        entries.extend(seldom.iter().map(|s| Entry::without_points(s.effect)));
+        Self { entries, listed, searched, forms, seldom }
     }
 
     /// The entries that are searched, at all their starting points.
@@ -81,15 +85,15 @@ impl Library {
         &self.entries[..self.searched]
     }
 
-    /// Places of those that are rarer.
-    pub fn seldom(&self) -> std::ops::Range<usize> {
-        self.searched..self.entries.len()
+    /// Those that are rarer, each at its place.
+    pub fn seldom(&self) -> impl Iterator<Item = (usize, &'static Seldom)> {
+        (self.searched..).zip(self.seldom.iter().copied())
     }
 
     /// The rarer one at this place, with its starting points.
     pub fn seldom_at(&self, scene: &Scene, index: usize) -> Option<Entry> {
-        let effect = self.entries[index].effect().filter(|_| self.seldom().contains(&index))?;
-        Entry::seldom(scene, effect)
+        let (_, seldom) = self.seldom().find(|(place, _)| *place == index)?;
+        Entry::seldom(scene, seldom.effect)
     }
 
     /// Whether a set holds an open form.
@@ -332,13 +336,14 @@ fn exchanged(frame: &Frame, entries: &[Entry], seen: &Seen, listed_ids: &[usize]
     let Some(best) = found.first().filter(|set| set.score > SHARP && (2..SET_MAX).contains(&set.members.len())) else {
         return Vec::new();
     };
-    let without = |i: usize| {
-        let mut set = best.without(i);
-        set.weigh(frame, entries);
-        set
-    };
     let size = best.members.len();
-    let mut others = search::grow(frame, seen, listed_ids, (0..size).map(without).collect(), size + 1);
+    let given_up = |i: usize| {
+        let mut rest = best.without(i);
+        rest.weigh(frame, entries);
+        let others: Vec<usize> = listed_ids.iter().filter(|id| **id != best.members[i].entry).copied().collect();
+        search::grow(frame, seen, &others, vec![rest], size + 1)
+    };
+    let mut others: Vec<Set> = (0..size).flat_map(given_up).collect();
     others.retain(|set| set.members.len() >= size && !found.iter().any(|other| other.key() == set.key()));
     search::distinct(&mut others);
     others

@@ -17,6 +17,7 @@ mod refused;
 mod resonant;
 mod separating;
 mod smooth;
+mod terms;
 mod trial;
 mod unlisted;
 mod unlogged;

@@ -56,8 +56,16 @@ pub const ALL: &[&Effect] = &[
     &time_offset::EFFECT,
 ];
 
-/// Effects of [`ALL`] under circumstances that are rarer, looked for where something is found that may be one of them.
-pub const SELDOM: &[&Effect] = &[&mass_shift::UNLOGGED];
+/// An effect of [`ALL`] under circumstances that are rarer, looked for where something is found that may be one of them.
+pub struct Seldom {
+    /// It.
+    pub effect: &'static Effect,
+    /// What it would be without these circumstances, in the catalogue that is searched or left out of it: never less likely.
+    pub usual: &'static Effect,
+}
+
+/// All of them.
+pub const SELDOM: &[Seldom] = &[Seldom { effect: &mass_shift::UNLOGGED, usual: &cg_offset::EFFECT }];
 
 /// The effect of an id.
 pub fn by_id(id: &str) -> Option<&'static Effect> {
