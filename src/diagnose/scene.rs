@@ -253,6 +253,14 @@ impl<'a> Scene<'a> {
         }
     }
 
+    /// The same scene of a case that differs in its log alone.
+    pub fn with_log_of<'b>(&self, case: &'b Case) -> Scene<'b>
+    where
+        'a: 'b,
+    {
+        Scene { case, ..self.clone() }
+    }
+
     /// The same scene with other measurements, of windows and of the bias: a bootstrap replicate.
     pub fn with_measured(&self, Measured { residual_ng, flips }: Measured) -> Self {
         let schedule = self.schedule.clone().with_flips(flips);

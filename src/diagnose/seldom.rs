@@ -30,7 +30,7 @@ pub fn found(scene: &Scene, library: &Library, listed: &[Weighed]) -> Vec<Weighe
 }
 
 /// What an entry may join: nothing, a set, and the set without one of its members; none that has the effect already.
-fn seeds(set: &Set, library: &Library, entry: &Entry) -> Vec<Set> {
+pub fn seeds(set: &Set, library: &Library, entry: &Entry) -> Vec<Set> {
     let id = |entry: &Entry| entry.effect().map(|effect| effect.id);
     let others = (0..set.members.len()).map(|i| set.without(i));
     let mut seeds: Vec<Set> = [Set::default(), set.clone()].into_iter().chain(others).collect();
@@ -42,7 +42,7 @@ fn seeds(set: &Set, library: &Library, entry: &Entry) -> Vec<Set> {
 }
 
 /// The best of what an entry, at its place in the library, joins.
-fn beside(frame: &Frame, library: &Library, seeds: &[Set], entry: &Entry, index: usize) -> Option<Set> {
+pub fn beside(frame: &Frame, library: &Library, seeds: &[Set], entry: &Entry, index: usize) -> Option<Set> {
     let bank = Bank::new(frame, from_ref(entry));
     let seen = bank.before(&frame.data);
     let with_it = |seed: &Set| {

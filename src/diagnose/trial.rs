@@ -25,6 +25,8 @@ const BLOCKS_S: [f64; 4] = [21_600.0, 10_800.0, 5400.0, 2700.0];
 const SHARE: f64 = 0.2;
 /// Share of the energy of a part that its prediction may be expected to miss, for the part to be predictable.
 const PREDICTABLE: f64 = 0.5;
+/// A miss that is as likely by chance, if the set is right, counts as the one expected.
+const BY_CHANCE: f64 = 0.05;
 /// Fewest windows that can be left out, or fitted to.
 const WINDOWS_MIN: usize = 50;
 /// Shortest hold that counts as an attitude, s, and the angle within which it is one, rad: a deadband is narrower.
@@ -39,7 +41,8 @@ const PLACEBO_SHARE: f64 = 0.5;
 pub struct Tried {
     /// Each half of alternate blocks, predicted from the other.
     pub blocks: HeldOut,
-    /// Share of the effect predicted in those halves of which the other can say more than half; none where they have too little of it:
+    /// Share of the effect predicted in those halves of which the other can say more than half, but for what chance misses; none where
+    /// they have too little of it:
     /// of a step between two blocks, each has nothing but a constant.
     pub confirmed: Option<f64>,
     /// Each attitude, predicted from all others; none where there is but one.
@@ -209,10 +212,12 @@ impl<'a> Trial<'a> {
             let signal = s.dot(&s);
             signal_energy += signal;
             missed_energy += missed.dot(&missed);
-            if on_train.normal.expected_miss(&on_test.normal) < PREDICTABLE * signal {
+            let expected = on_train.normal.expected_miss(&on_test.normal);
+            if expected.energy < PREDICTABLE * signal {
                 let missed = s.less(&whiten(&self.predict(&on_train.normal.free_mean())), 1.0);
+                let missed = missed.dot(&missed);
                 predictable += signal;
-                unpredicted += missed.dot(&missed);
+                unpredicted += if expected.chance(missed) > BY_CHANCE { missed.min(expected.energy) } else { missed };
             }
             let left = test.frame.data.less(&p, 1.0);
             for k in 0..3 {

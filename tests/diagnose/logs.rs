@@ -1,5 +1,8 @@
 //! Logs as they are kept: by another clock, of very many kinds, with one night twice.
 
+use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
+use oare_ground::diagnose::{Settings, diagnose};
+
 use super::drag_case::{drag, files, with_key, with_lines};
 
 #[test]
@@ -52,4 +55,28 @@ fn sleep_that_is_logged_twice_is_no_more_sleep() {
     });
     let [once, twice] = [files(), twice].map(|files| drag(&files));
     assert_eq!(once, twice);
+}
+
+/// The clock of a log is asked about where what it logs is plainly there, only at another time.
+#[test]
+fn a_log_that_is_hours_off_is_asked_about() {
+    for (effect, seed) in [("water_dump", 1_460_003), ("crew_activity", 1_460_001)] {
+        let concealed = draw_order(&Order { kind: Kind::One, seed, only: Some(effect), manner: Manner::default() });
+        assert!(concealed.truth.snr[effect] > 10.0, "{:?}", concealed.truth.snr);
+        let asked = |earlier_s: f64| {
+            let mut files = concealed.files.clone();
+            let (_, log) = files.iter_mut().find(|(name, _)| name == "events.csv").unwrap();
+            let text = String::from_utf8(log.clone()).unwrap();
+            let moved = |line: &str| match line.split_once(',').map(|(at, rest)| (at.parse::<f64>(), rest)) {
+                Some((Ok(clock_s), rest)) => format!("{},{rest}\n", clock_s - earlier_s),
+                _ => format!("{line}\n"),
+            };
+            *log = text.lines().map(moved).collect::<String>().into();
+            let found = diagnose(&super::case(&files), &Settings::default()).unwrap();
+            found.notes.into_iter().find(|note| note.contains("is the log of another clock"))
+        };
+        assert_eq!(asked(0.0), None);
+        let note = asked(3600.0).unwrap_or_default();
+        assert!(note.contains("3600 s later") && note.contains(effect), "{effect}: {note}");
+    }
 }

@@ -1,6 +1,7 @@
 //! The evidence of columns: of those chosen, and of more beside them.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{Column, Frame};
 
@@ -15,6 +16,25 @@ pub struct Normal {
 
 /// Inverse square of how much wider a prior is taken where it must not decide: six times.
 const WIDE: f64 = 0.03;
+
+/// Whitened energy that a prediction is expected to miss: a sum of squares of normal numbers.
+pub struct Miss {
+    /// Sum of their variances: the mean.
+    pub energy: f64,
+    /// Sum of the squares of their variances: half the variance.
+    squared: f64,
+}
+
+impl Miss {
+    /// The chance that so much or more is missed: by the chi squared that has its mean and variance.
+    pub fn chance(&self, missed: f64) -> f64 {
+        if self.energy <= 0.0 {
+            return 0.0;
+        }
+        let each = self.squared / self.energy;
+        ChiSquared::new(self.energy / each).map_or(0.0, |chi2| chi2.sf(missed / each))
+    }
+}
 
 impl Normal {
     /// Of columns beside nothing, before no data.
@@ -95,15 +115,15 @@ impl Normal {
     /// Whitened energy that a prediction from this part of a record is expected to miss of the series fitted to all of it, in the
     /// part `unseen`: the posterior means of nested data differ by the fall of the posterior covariance. The priors are taken far
     /// wider than they are, so that an effect several times its usual size is not thought to be known before it is seen.
-    pub fn expected_miss(&self, unseen: &Normal) -> f64 {
+    pub fn expected_miss(&self, unseen: &Normal) -> Miss {
         let n = self.y.len();
-        if n == 0 {
-            return 0.0;
-        }
         let covariance = |a: &DMatrix<f64>| Cholesky::new(a + DMatrix::identity(n, n) * WIDE).map(|c| c.inverse());
         match (covariance(&self.a), covariance(&(&self.a + &unseen.a))) {
-            (Some(seen), Some(all)) => (&unseen.a * (seen - all)).trace(),
-            _ => f64::INFINITY,
+            (Some(seen), Some(all)) => {
+                let miss = &unseen.a * (seen - all);
+                Miss { energy: miss.trace(), squared: (&miss * &miss).trace() }
+            }
+            _ => Miss { energy: f64::INFINITY, squared: f64::INFINITY },
         }
     }
 

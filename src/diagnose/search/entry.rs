@@ -64,6 +64,11 @@ impl Entry {
         }
     }
 
+    /// The same at points of which each is as likely, `None` where there is none.
+    pub fn at(self, points: Vec<(Theta, Shape)>) -> Option<Self> {
+        (!points.is_empty()).then(|| Self { log_shares: equal(points.len()), points, ..self })
+    }
+
     /// An open form.
     pub fn open(index: usize, shapes: Vec<Shape>, log_prior: f64) -> Self {
         let count = shapes.first().map_or(0, Shape::count);

@@ -10,6 +10,7 @@ mod imitators;
 mod inputs;
 mod judge;
 mod limits;
+mod log_clock;
 mod named;
 mod nearest;
 mod proportion;
@@ -23,6 +24,7 @@ use self::fit::fit;
 use self::inputs::of_inputs;
 use self::judge::{Judged, judge};
 use self::limits::upper_limits;
+use self::log_clock::of_another_clock;
 use self::named::name;
 use self::nearest::nearest;
 use self::proportion::{of_proportion, of_the_simulation};
@@ -195,6 +197,7 @@ impl Findings<'_> {
             answer.alternatives = nearest(library, &solution.null, &self.listed);
         }
         let nothing = Set::default();
+        answer.notes.extend(of_another_clock(scene, library, &frame, &nothing));
         answer.upper_limits = upper_limits(library, &frame, &nothing);
         answer.fit = Some(fit(scene, library, &frame, &solution.null, &nothing, self.tried, &mut answer.notes).0);
         (answer, axes::nothing(scene.schedule.len()))
@@ -217,6 +220,9 @@ impl Findings<'_> {
             ..locate::of_signal(scene, &signal, &onsets_s(&best.fits))
         };
         answer.upper_limits = upper_limits(library, &best.frame, &best.set);
+        if answer.verdict == Verdict::Unexplained || !onsets_s(&best.fits).is_empty() {
+            answer.notes.extend(of_another_clock(scene, library, &best.frame, &best.set));
+        }
         if answer.verdict == Verdict::Unexplained {
             let best_ids = ids(library, &best.set).join(" + ");
             match (self.failure, self.remains) {
