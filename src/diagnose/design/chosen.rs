@@ -329,3 +329,31 @@ impl<'a> Choices<'a> {
         which.iter().map(beside).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missed_by_chance_has_the_chi_squared_of_its_numbers() {
+        // Five per cent of one number, of variance 2, and of three of variance 0.5.
+        let one = Miss { energy: 2.0, squared: 4.0 };
+        assert!((one.chance(2.0 * 3.8415) - 0.05).abs() < 1e-4, "{}", one.chance(2.0 * 3.8415));
+        let three = Miss { energy: 1.5, squared: 0.75 };
+        assert!((three.chance(0.5 * 7.8147) - 0.05).abs() < 1e-4, "{}", three.chance(0.5 * 7.8147));
+        assert_eq!(Miss { energy: 0.0, squared: 0.0 }.chance(1.0), 0.0);
+    }
+
+    /// Two parts of a record that see a coefficient alike: of the fit to both, a prediction from one misses half of its own error in the other.
+    #[test]
+    fn a_prediction_misses_what_the_unseen_part_adds() {
+        let part = Normal { a: DMatrix::from_element(1, 1, 400.0), y: DVector::zeros(1), mean: DVector::zeros(1) };
+        let miss = part.expected_miss(&part);
+        assert!(
+            (miss.energy - 0.5).abs() < 1e-3 && (miss.squared - 0.25).abs() < 1e-3,
+            "{} {}",
+            miss.energy,
+            miss.squared
+        );
+    }
+}
