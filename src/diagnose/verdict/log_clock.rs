@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::diagnose::case::{Case, Expectation};
 use crate::diagnose::catalogue::{
-    Effect, crew_activity, evaporator_venting, mass_shift, thruster_residual, water_dump,
+    Effect, Shape, Theta, crew_activity, evaporator_venting, mass_shift, thruster_residual, water_dump,
 };
 use crate::diagnose::design::Frame;
 use crate::diagnose::scene::Scene;
@@ -39,21 +39,25 @@ pub fn of_another_clock(scene: &Scene, library: &Library, frame: &Frame, set: &S
     let lift_off_s = scene.case.header.liftoff_clock_s;
     let half_hours = (-HALF_HOURS..=HALF_HOURS).filter(|n| *n != 0).map(|n| HALF_HOUR_S * f64::from(n));
     let later_s: Vec<f64> = half_hours.chain([-DAY_S, DAY_S, -lift_off_s, lift_off_s]).collect();
-    let cases: Vec<Case> = later_s.iter().map(|later_s| with_a_later_log(scene.case, *later_s)).collect();
-    let tried = |effect: &&'static Effect| {
-        let points = later_s.iter().zip(&cases).filter_map(|(later_s, case)| {
-            let scene = scene.with_log_of(case);
+    // Of every clock one case at a time: a log is small, and what it comes with is not.
+    let by_clock = shared_work::map(&later_s, |later_s| {
+        let case = with_a_later_log(scene.case, *later_s);
+        let scene = scene.with_log_of(&case);
+        LOGGED.map(|effect| {
             let theta = (effect.grid)(&scene).into_iter().next()?;
             Some(([*later_s, 0.0], (effect.signature)(&scene, &theta)?))
-        });
-        let entry = Entry::without_points(effect).at(points.collect())?;
+        })
+    });
+    let mut points: [Vec<(Theta, Shape)>; LOGGED.len()] = Default::default();
+    by_clock.into_iter().for_each(|of_clock| points.iter_mut().zip(of_clock).for_each(|(all, one)| all.extend(one)));
+    let tried = |(effect, points): (&'static Effect, Vec<(Theta, Shape)>)| {
+        let entry = Entry::without_points(effect).at(points)?;
         let seeds = seldom::seeds(set, library, &entry);
         let found = seldom::beside(frame, library, &seeds, &entry, library.entries.len())?;
-        let gained = found.score - set.score;
-        Some((found.members.last()?.theta[0], gained, effect.id))
+        Some((found.members.last()?.theta[0], found.score - set.score, effect.id))
     };
-    let found: Vec<(f64, f64, &str)> = shared_work::map(&LOGGED, tried).into_iter().flatten().collect();
-    let (later_s, gained, id) = found.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).filter(|most| most.1 > TOLD)?;
+    let found = LOGGED.into_iter().zip(points).filter_map(tried);
+    let (later_s, gained, id) = found.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|most| most.1 > TOLD)?;
     let which = if later_s < 0.0 { "earlier" } else { "later" };
     let since_lift_off = if later_s == lift_off_s { ", as if it told the time since lift-off" } else { "" };
     Some(format!(
