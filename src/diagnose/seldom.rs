@@ -7,10 +7,7 @@ use super::catalogue::Seldom;
 use super::design::Frame;
 use super::scene::Scene;
 use super::search::{self, Bank, Entry, Set, Weighed};
-use super::solve::Library;
-
-/// Log score below the best listed set, at its noise, from which a set is weighed with its own.
-const WORTH_WEIGHING: f64 = -6.0;
+use super::solve::{ALONG, Library};
 
 /// The best set with each of the rarer effects, weighed, as far as it may be likelier than the best of `listed`, and is than the same
 /// without its circumstances: an offset from the beginning is no shift, whether or not the catalogue has offsets.
@@ -22,7 +19,7 @@ pub fn found(scene: &Scene, library: &Library, listed: &[Weighed]) -> Vec<Weighe
         let seeds = seeds(&set, library, &entry);
         let found = beside(&frame, library, &seeds, &entry, index)?;
         let usual = Entry::listed(scene, seldom.usual).and_then(|usual| beside(&frame, library, &seeds, &usual, index));
-        let likelier = usual.map_or(f64::NEG_INFINITY, |usual| usual.score).max(set.score + WORTH_WEIGHING);
+        let likelier = usual.map_or(f64::NEG_INFINITY, |usual| usual.score).max(set.score - ALONG);
         (found.score > likelier)
             .then(|| search::weigh_with_own_noise(scene, &library.entries, &found, &best.noise, 2, 40))
     };

@@ -34,7 +34,7 @@ const EXCHANGED: usize = 4;
 
 /// Log score below the best at one noise up to which a set is weighed whatever the next noise makes of it, several times the one by which
 /// a leak and a step were apart that needed it; and how many such sets, each as dear as any that is weighed.
-const ALONG: f64 = 6.0;
+pub const ALONG: f64 = 6.0;
 const ALONG_MAX: usize = 3;
 
 /// Log posterior by which a null's noise must be improved upon for the search to begin again from there, and searches at most.
@@ -53,12 +53,18 @@ pub struct Library {
     pub forms: Vec<Said>,
     /// Those that are rarer, in their order.
     seldom: Vec<&'static Seldom>,
+    /// Ids of effects that are not to be thought of.
+    without: Vec<String>,
+}
+
+fn is_allowed(effect: &Effect, without: &[String]) -> bool {
+    !without.iter().any(|id| id == effect.id)
 }
 
 impl Library {
     /// The whole catalogue but the ids of `without`, and the dictionary.
     pub fn new(scene: &Scene, without: &[String]) -> Self {
-        let is_allowed = |effect: &Effect| !without.iter().any(|id| id == effect.id);
+        let is_allowed = |effect: &Effect| is_allowed(effect, without);
         let allowed: Vec<&'static Effect> =
             catalogue::ALL.iter().filter(|effect| is_allowed(effect)).copied().collect();
         let (entries, dictionary) = shared_work::both(
@@ -77,7 +83,12 @@ impl Library {
         let mut seldom: Vec<&'static Seldom> = catalogue::SELDOM.iter().collect();
         seldom.retain(|s| is_allowed(s.effect));
         entries.extend(seldom.iter().map(|s| Entry::without_points(s.effect)));
-        Self { entries, listed, searched, forms, seldom }
+        Self { entries, listed, searched, forms, seldom, without: without.to_vec() }
+    }
+
+    /// Whether an effect may be thought of.
+    pub fn allows(&self, effect: &Effect) -> bool {
+        is_allowed(effect, &self.without)
     }
 
     /// The entries that are searched, at all their starting points.

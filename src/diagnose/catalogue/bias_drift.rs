@@ -23,7 +23,7 @@ pub const EFFECT: Effect = Effect {
     why: "The bias of each sensor axis relaxes from the beginning of the record with one time constant, whatever the attitude does.",
 };
 
-/// Shortest and longest time constant, s: what is switched on settles within a quarter of an hour or more.
+/// Shortest and longest time constant, s: from what settles after it is switched on to the law of the flight report.
 const TAU_RANGE_S: [f64; 2] = [900.0, 500_000.0];
 
 fn grid(_: &Scene) -> Vec<Theta> {

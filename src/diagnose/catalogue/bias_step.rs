@@ -1,6 +1,6 @@
 //! The bias steps at an instant and stays.
 
-use super::{Effect, ONSET, SELDOM_LARGE, Shape, Theta, anywhere, in_sensor, onsets, push};
+use super::{Effect, ONSET, SELDOM_LARGE, Shape, Theta, anywhere, in_sensor, is_inside, onsets, push};
 use crate::diagnose::instants::of_a_turn;
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
@@ -29,9 +29,7 @@ fn grid(scene: &Scene) -> Vec<Theta> {
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
-    let [start, end] = scene.span_s();
-    (theta[0] > start + 300.0 && theta[0] < end - 300.0)
-        .then(|| in_sensor(scene, |clock_s| decay(clock_s, theta[0], f64::INFINITY)))
+    is_inside(scene, theta[0]).then(|| in_sensor(scene, |clock_s| decay(clock_s, theta[0], f64::INFINITY)))
 }
 
 #[cfg(test)]

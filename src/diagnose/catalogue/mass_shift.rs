@@ -1,6 +1,6 @@
 //! The centre of gravity steps at a change of mass: a = T dr after the event, in the pattern of T only. Nearly always the log has it.
 
-use super::{Effect, Linear, Nonlinear, ONSET, Shape, Theta, USUAL_OR_SMALL, anywhere, no_density, onsets};
+use super::{Effect, Linear, Nonlinear, ONSET, Shape, Theta, USUAL_OR_SMALL, anywhere, is_inside, no_density, onsets};
 use crate::diagnose::design::Raw;
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::{Axes, Scene};
@@ -43,7 +43,8 @@ pub const UNLOGGED: Effect = Effect {
     ..EFFECT
 };
 
-/// Spacing of the instants tried first, s: half of it is hardly anything of what it is felt for; and their number at most.
+/// Spacing of the instants tried first, s: half an hour away the sizes fit nearly as well, and the best is refined from there. Their number
+/// at most, of records of many days: each is three series as long as the record.
 const UNLOGGED_SPACING_S: f64 = 3600.0;
 const UNLOGGED_MAX: f64 = 100.0;
 
@@ -68,13 +69,11 @@ fn grid(scene: &Scene) -> Vec<Theta> {
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
-    let [start, end] = scene.span_s();
     let after = decay(scene.clock_s(), theta[0], f64::INFINITY);
     let from_then_on = |arm: &Axes| -> Raw {
         arm.each_ref().map(|series| Some(series.iter().zip(&after).map(|(a, s)| a * s).collect()))
     };
-    (theta[0] > start + 300.0 && theta[0] < end - 300.0)
-        .then(|| Shape::Columns(scene.lever_arms_ng().iter().map(from_then_on).collect()))
+    is_inside(scene, theta[0]).then(|| Shape::Columns(scene.lever_arms_ng().iter().map(from_then_on).collect()))
 }
 
 #[cfg(test)]

@@ -358,6 +358,15 @@ pub fn anywhere(scene: &Scene, _: &Theta) -> f64 {
     -(end - start).ln()
 }
 
+/// Onsets nearer to the ends of the record than this leave nothing to tell what was before from what is after, s.
+const FROM_THE_ENDS_S: f64 = 300.0;
+
+/// Whether an onset is inside the record.
+pub fn is_inside(scene: &Scene, onset_s: f64) -> bool {
+    let [start, end] = scene.span_s();
+    onset_s > start + FROM_THE_ENDS_S && onset_s < end - FROM_THE_ENDS_S
+}
+
 /// Onsets at a spacing inside the record, away from its ends by `margin_s`.
 pub fn onsets(scene: &Scene, spacing_s: f64, margin_s: f64) -> Vec<f64> {
     let [start, end] = scene.span_s();

@@ -52,7 +52,7 @@ impl Entry {
         Self::listed(scene, effect).map(|entry| Self { log_prior: LOG_PRIOR + LOG_SELDOM, ..entry })
     }
 
-    /// The same without its starting points, to hold its place among others.
+    /// The same without its starting points: to hold its place among others, or to be given some.
     pub fn without_points(effect: &'static Effect) -> Self {
         Self {
             family: Family::Listed(effect),

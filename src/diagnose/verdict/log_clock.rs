@@ -13,11 +13,12 @@ use crate::diagnose::search::{Entry, Set};
 use crate::diagnose::seldom;
 use crate::diagnose::solve::Library;
 use crate::math::shared_work;
+use crate::physics::time::S_PER_DAY;
 
-/// Clocks are apart by half hours, up to so many, or by a day.
+/// Clocks are apart by half hours, up to so many, by a day, or by the time of lift-off; by less than half an hour, no entry is far from what it
+/// explains.
 const HALF_HOUR_S: f64 = 1800.0;
 const HALF_HOURS: i32 = 24;
-const DAY_S: f64 = 86_400.0;
 /// Log odds above what is found, of a hundred and fifty, from which it is told.
 const TOLD: f64 = 5.0;
 
@@ -37,13 +38,13 @@ pub fn of_another_clock(scene: &Scene, library: &Library, frame: &Frame, set: &S
         return None;
     }
     let lift_off_s = scene.case.header.liftoff_clock_s;
-    let half_hours = (-HALF_HOURS..=HALF_HOURS).filter(|n| *n != 0).map(|n| HALF_HOUR_S * f64::from(n));
-    let later_s: Vec<f64> = half_hours.chain([-DAY_S, DAY_S, -lift_off_s, lift_off_s]).collect();
+    let later_s = later_by_s(lift_off_s);
     // Of every clock one case at a time: a log is small, and what it comes with is not.
     let by_clock = shared_work::map(&later_s, |later_s| {
         let case = with_a_later_log(scene.case, *later_s);
         let scene = scene.with_log_of(&case);
         LOGGED.map(|effect| {
+            // The first of the ways that an effect has to go by the log is enough to ask.
             let theta = (effect.grid)(&scene).into_iter().next()?;
             Some(([*later_s, 0.0], (effect.signature)(&scene, &theta)?))
         })
@@ -51,7 +52,7 @@ pub fn of_another_clock(scene: &Scene, library: &Library, frame: &Frame, set: &S
     let mut points: [Vec<(Theta, Shape)>; LOGGED.len()] = Default::default();
     by_clock.into_iter().for_each(|of_clock| points.iter_mut().zip(of_clock).for_each(|(all, one)| all.extend(one)));
     let tried = |(effect, points): (&'static Effect, Vec<(Theta, Shape)>)| {
-        let entry = Entry::without_points(effect).at(points)?;
+        let entry = library.allows(effect).then(|| Entry::without_points(effect).at(points))??;
         let seeds = seldom::seeds(set, library, &entry);
         let found = seldom::beside(frame, library, &seeds, &entry, library.entries.len())?;
         Some((found.members.last()?.theta[0], found.score - set.score, effect.id))
@@ -67,8 +68,29 @@ pub fn of_another_clock(scene: &Scene, library: &Library, frame: &Frame, set: &S
     ))
 }
 
+/// By how much the log of another clock is late, s.
+fn later_by_s(lift_off_s: f64) -> Vec<f64> {
+    let half_hours = (-HALF_HOURS..=HALF_HOURS).map(|n| HALF_HOUR_S * f64::from(n));
+    let all = half_hours.chain([-S_PER_DAY, S_PER_DAY, -lift_off_s, lift_off_s]);
+    all.filter(|later_s| later_s.abs() >= HALF_HOUR_S).collect()
+}
+
 fn with_a_later_log(case: &Case, later_s: f64) -> Case {
     let mut events = case.events.clone();
     events.iter_mut().for_each(|event| event.clock_s += later_s);
     Case { expected: Arc::new(Expectation { events, ..Expectation::clone(&case.expected) }), ..case.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_by_its_own_clock_is_not_tried_again() {
+        assert_eq!(later_by_s(13_800.0).len(), 52);
+        for lift_off_s in [0.0, 20.0] {
+            let later_s = later_by_s(lift_off_s);
+            assert!(later_s.len() == 50 && later_s.iter().all(|s| s.abs() >= HALF_HOUR_S), "{later_s:?}");
+        }
+    }
 }
