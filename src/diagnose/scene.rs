@@ -326,9 +326,12 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Whether the crew sleeps, by its log, for most of each window.
+/// Whether the crew sleeps, by its log, about the middle of the samples that each window is the first to have.
 fn asleep(case: &Case) -> Vec<bool> {
-    coverage(&case.recording.clock_s, &union(case.spans("crew_sleep"))).iter().map(|share| *share > 0.5).collect()
+    let clock_s = &case.recording.clock_s;
+    let new_s = |i: usize| if i == 0 { f64::INFINITY } else { clock_s[i] - clock_s[i - 1] }.min(2.0 * HALF_WINDOW_S);
+    let middles: Vec<f64> = clock_s.iter().enumerate().map(|(i, t)| t + HALF_WINDOW_S - 0.5 * new_s(i)).collect();
+    coverage(&middles, &union(case.spans("crew_sleep"))).iter().map(|share| *share > 0.5).collect()
 }
 
 fn bodies(q: &[[f64; 4]]) -> Result<Vec<Mat3>, CaseError> {

@@ -86,14 +86,17 @@ fn variance_of_sum(windows: &[usize], noise: &AxisNoise, schedule: &Schedule, ac
             r.rms_ng.powi(2) * r.transition(apart_s)[0][0] * r.loudness(activity[i]) * r.loudness(activity[j])
         })
     };
+    let new = |i: usize| white * activity[i].powi(2);
     let mut sum = 0.0;
     for (a, i) in windows.iter().enumerate() {
-        sum += activity[*i].powi(2) * (white + short) + oscillating(*i, *i, 0.0);
+        let [own, previous] = schedule.overlap[*i];
+        sum += own * own * new(*i) + previous * previous * new(i.saturating_sub(1));
+        sum += activity[*i].powi(2) * short + oscillating(*i, *i, 0.0);
         for j in &windows[a + 1..] {
             let apart = schedule.clock_s[*j] - schedule.clock_s[*i];
-            let shared = if *j == i + 1 { schedule.overlap[*j][1] * schedule.overlap[*i][0] * white } else { 0.0 };
+            let shared = if *j == i + 1 { schedule.overlap[*j][1] * own * new(*i) } else { 0.0 };
             let short = short * (-apart / noise.short_tau_s).exp();
-            sum += 2.0 * (activity[*i] * activity[*j] * (shared + short) + oscillating(*i, *j, apart));
+            sum += 2.0 * (shared + activity[*i] * activity[*j] * short + oscillating(*i, *j, apart));
         }
     }
     sum

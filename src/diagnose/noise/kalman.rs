@@ -74,16 +74,17 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
         };
         let mut variance = [0.0; L];
         for l in 0..L {
-            let [vw, v1, v2] = [self.variance[0][l] * burst[l], self.variance[1][l], self.variance[2][l]];
+            // The samples that are new are as loud as this window; those before keep the level they had.
+            let [vw, v1, v2] = [self.variance[0][l] * burst[l] * s[l] * s[l], self.variance[1][l], self.variance[2][l]];
             let [f1, f2] = [self.decay[0][l], self.decay[1][l]];
             let (p00, p01, p02) = (self.p[0][l], self.p[1][l] * f1, self.p[2][l] * f2);
             let p11 = f1 * f1 * (self.p[3][l] - v1) + v1;
             let p12 = self.p[4][l] * f1 * f2;
             let p22 = f2 * f2 * (self.p[5][l] - v2) + v2;
-            let (h0, h1) = (s[l] * previous, s[l]);
+            let (h0, h1) = (previous, s[l]);
             let [mut c0, mut c1, mut c2] =
                 [h0 * p00 + h1 * p01 + p02, h0 * p01 + h1 * p11 + p12, h0 * p02 + h1 * p12 + p22];
-            let ce = s[l] * own * vw;
+            let ce = own * vw;
             // Covariances of what is seen with each resonance.
             let mut cr = [[0.0; 2]; R];
             let mut seen = 0.0;
@@ -99,7 +100,7 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
                 seen += hr * cr[r][0];
                 row.resonance_h[r][l] = hr;
             }
-            variance[l] = h0 * c0 + h1 * c1 + c2 + seen + s[l] * own * ce;
+            variance[l] = h0 * c0 + h1 * c1 + c2 + seen + own * ce;
             let inverse = 1.0 / variance[l];
             let gain = [ce * inverse, c1 * inverse, c2 * inverse];
             self.p[0][l] = vw - ce * gain[0];

@@ -203,10 +203,16 @@ mod tests {
         let whiteners = noises.map(|noise| Whitener::new(&noise, &schedule, &loudness));
         let series = [Series { data: &data, shared: &[] }; 3];
         let found = products(&noises, &schedule, [&loudness; 3], series);
+        // Windows are sums of samples of their own and of those of the window before, which are as loud as that is.
+        let new = |i: usize| (NOISE.white_ng * loudness.activity[i]).powi(2);
+        let white = |i: usize, j: usize| match (schedule.overlap[i], schedule.overlap[j]) {
+            ([own, previous], _) if i == j => own * own * new(i) + previous * previous * new(i.max(1) - 1),
+            ([own, _], [_, previous]) if j == i + 1 => own * previous * new(i),
+            _ => 0.0,
+        };
         for ((noise, whitener), found) in noises.iter().zip(&whiteners).zip(&found) {
             let covariance = DMatrix::from_fn(n, n, |i, j| {
                 let apart = (clock[i] - clock[j]).abs();
-                let white = NOISE.white_ng.powi(2) * (1.0 - apart / 50.0).max(0.0);
                 let short = NOISE.short_ng.powi(2) * (-apart / NOISE.short_tau_s).exp();
                 let slow = NOISE.slow_ng.powi(2) * (-apart / NOISE.slow_tau_s).exp();
                 let oscillating = noise.resonance.map_or(0.0, |r| {
@@ -216,7 +222,10 @@ mod tests {
                 });
                 let activities = loudness.activity[i] * loudness.activity[j];
                 let follows = noise.resonance.is_some_and(|r| r.follows_crew);
-                activities * (white + short) + if follows { activities } else { 1.0 } * oscillating + slow
+                white(i.min(j), i.max(j))
+                    + activities * short
+                    + if follows { activities } else { 1.0 } * oscillating
+                    + slow
             });
             let inverse = covariance.clone().try_inverse().unwrap();
             let (one, d) = (DVector::from_element(n, 1.0), DVector::from_column_slice(&data));

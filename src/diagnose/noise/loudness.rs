@@ -5,7 +5,8 @@ use crate::math::rms::rms;
 /// How loud each window of an axis is, beside the noise that all of them have.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Loudness {
-    /// Level of the white and the short noise that the crew's activity gives; mean square 1.
+    /// Level that the crew's activity gives the short noise of a window and the white noise of the samples that the window is the first
+    /// to have; mean square 1.
     pub activity: Vec<f64>,
     /// Variance of the samples that a window is the first to have, over their usual one: above 1 where they are out of the ordinary.
     /// The window after it shares them, so that a burst is one event, not two.

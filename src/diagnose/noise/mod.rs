@@ -350,9 +350,9 @@ pub fn simulate(
                 *state = r.next(*state, step, [normal(), normal()]);
                 r.loudness(loudness.activity[i]) * state[0]
             });
-            let own = noise.white_ng * loudness.burst[i].sqrt() * normal();
+            let own = noise.white_ng * loudness.activity[i] * loudness.burst[i].sqrt() * normal();
             let [a, b] = schedule.overlap[i];
-            let value = loudness.activity[i] * (a * own + b * previous + short) + oscillating + slow;
+            let value = a * own + b * previous + loudness.activity[i] * short + oscillating + slow;
             previous = own;
             value
         })
@@ -424,6 +424,23 @@ mod tests {
             let r = w.iter().zip(&w[lag..]).map(|(a, b)| a * b).sum::<f64>() / n;
             assert!(r.abs() < 0.1, "lag {lag}: {r}");
         }
+    }
+
+    /// Halves of windows three times as loud for some minutes as for the next: both windows that have a half have it as loud as it is.
+    #[test]
+    fn samples_are_as_loud_in_the_window_after_theirs_as_in_their_own() {
+        let mut normal = normals(9);
+        let n = 4000;
+        let levels: Vec<f64> = (0..=n).map(|half| if half / 35 % 2 == 0 { 3.0 } else { 1.0 }).collect();
+        let halves: Vec<f64> = levels.iter().map(|level| level * normal() / 2f64.sqrt()).collect();
+        let x: Vec<f64> = halves.windows(2).map(|pair| pair[0] + pair[1]).collect();
+        let schedule = Schedule::new(&(0..n).map(|i| 25.0 * i as f64).collect::<Vec<f64>>());
+        let noise = AxisNoise { white_ng: 1.0, short_ng: 1e-3, slow_ng: 1e-6, ..NOISE };
+        let w = Whitener::new(&noise, &schedule, &Loudness::even(levels[1..].to_vec())).whiten(&x);
+        let behind_a_change = (0..n).filter(|i| levels[i + 1] != levels[*i]).flat_map(|i| i..(i + 20).min(n));
+        let squares: Vec<f64> = behind_a_change.map(|i| w[i] * w[i]).collect();
+        let (variance, count) = (squares.iter().sum::<f64>() / squares.len() as f64, squares.len() as f64);
+        assert!(count > 2000.0 && (variance - 1.0).abs() < 5.0 * (2.0 / count).sqrt(), "{variance} of {count}");
     }
 
     #[test]
