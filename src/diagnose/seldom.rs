@@ -15,7 +15,7 @@ pub fn found(scene: &Scene, library: &Library, listed: &[Weighed]) -> Vec<Weighe
     let Some(best) = listed.first() else { return Vec::new() };
     let (frame, set) = best.framed(scene, &library.entries);
     let of_one = |(index, seldom): (usize, &Seldom)| -> Option<Weighed> {
-        let entry = Entry::seldom(scene, seldom.effect)?;
+        let entry = Entry::seldom(scene, seldom)?;
         let seeds = seeds(&set, library, &entry);
         let found = beside(&frame, library, &seeds, &entry, index)?;
         let usual = Entry::listed(scene, seldom.usual).and_then(|usual| beside(&frame, library, &seeds, &usual, index));

@@ -82,7 +82,7 @@ impl Library {
         let searched = entries.len();
         let mut seldom: Vec<&'static Seldom> = catalogue::SELDOM.iter().collect();
         seldom.retain(|s| is_allowed(s.effect));
-        entries.extend(seldom.iter().map(|s| Entry::without_points(s.effect)));
+        entries.extend(seldom.iter().map(|s| Entry::without_points(s.effect, s.log_odds)));
         Self { entries, listed, searched, forms, seldom, without: without.to_vec() }
     }
 
@@ -104,7 +104,7 @@ impl Library {
     /// The rarer one at this place, with its starting points.
     pub fn seldom_at(&self, scene: &Scene, index: usize) -> Option<Entry> {
         let (_, seldom) = self.seldom().find(|(place, _)| *place == index)?;
-        Entry::seldom(scene, seldom.effect)
+        Entry::seldom(scene, seldom)
     }
 
     /// Whether a set holds an open form.

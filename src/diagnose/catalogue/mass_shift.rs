@@ -43,6 +43,44 @@ pub const UNLOGGED: Effect = Effect {
     ..EFFECT
 };
 
+/// The same of a logged change that takes its time: it is taken for one at the middle of it.
+pub const LATE: Effect = Effect {
+    nonlinear: &[ONSET],
+    grid: late,
+    log_density: soon_after_an_entry,
+    signature: late_signature,
+    assumes: Some(|scene, theta| {
+        let at = before(scene, theta[0])?;
+        Some(format!(
+            "mass_shift: the change of mass that the log has at {at:.0} s is fitted {:.0} s later: one is taken that goes on for a while",
+            theta[0] - at
+        ))
+    }),
+    why: "The residual begins soon after a logged change of mass and follows the gravity-gradient and rotation tensor from there on: the centre of gravity moved, for as long as the change went on.",
+    ..EFFECT
+};
+
+/// Longest time from an entry of the log to the middle of the change, s: a transfer of propellant lasts some tens of minutes.
+const LATE_MAX_S: f64 = 1200.0;
+
+/// The logged change of mass before an instant, soon enough.
+fn before(scene: &Scene, onset_s: f64) -> Option<f64> {
+    logged(scene).filter(|t| (0.0..LATE_MAX_S).contains(&(onset_s - t))).reduce(f64::max)
+}
+
+fn late(scene: &Scene) -> Vec<Theta> {
+    let times = [0.125, 0.375, 0.625, 0.875].map(|share| share * LATE_MAX_S);
+    logged(scene).flat_map(|t| times.map(|later| [t + later, 0.0])).collect()
+}
+
+fn soon_after_an_entry(scene: &Scene, _: &Theta) -> f64 {
+    -(logged(scene).count().max(1) as f64 * LATE_MAX_S).ln()
+}
+
+fn late_signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
+    before(scene, theta[0]).and_then(|_| signature(scene, theta))
+}
+
 /// Spacing of the instants tried first, s: half an hour away the sizes fit nearly as well, and the best is refined from there. Their number
 /// at most, of records of many days: each is three series as long as the record.
 const UNLOGGED_SPACING_S: f64 = 3600.0;
@@ -54,18 +92,15 @@ fn unlogged(scene: &Scene) -> Vec<Theta> {
     onsets(scene, spacing_s, 900.0).into_iter().map(|t| [t, 0.0]).collect()
 }
 
-fn grid(scene: &Scene) -> Vec<Theta> {
+/// Logged changes of mass inside the record.
+fn logged(scene: &Scene) -> impl Iterator<Item = f64> {
     let [start, end] = scene.span_s();
-    let inside = |t: &f64| *t > start + 600.0 && *t < end - 600.0;
-    scene
-        .case
-        .events
-        .iter()
-        .filter(|e| e.kind == "mass_change")
-        .map(|e| e.clock_s)
-        .filter(inside)
-        .map(|t| [t, 0.0])
-        .collect()
+    let inside = move |t: &f64| *t > start + 600.0 && *t < end - 600.0;
+    scene.case.events.iter().filter(|e| e.kind == "mass_change").map(|e| e.clock_s).filter(inside)
+}
+
+fn grid(scene: &Scene) -> Vec<Theta> {
+    logged(scene).map(|t| [t, 0.0]).collect()
 }
 
 fn signature(scene: &Scene, theta: &Theta) -> Option<Shape> {
@@ -93,5 +128,7 @@ mod tests {
             before == 0.0 && (after + 409.0).abs() < 0.8 && (half / after - 0.5).abs() < 1e-6,
             "{before} {half} {after}"
         );
+        let late = |onset_s: f64| (LATE.signature)(&scene, &[onset_s, 0.0]).is_some();
+        assert!(late(onset_s + 300.0) && !late(onset_s + 1500.0) && !late(onset_s - 100.0));
     }
 }

@@ -62,10 +62,17 @@ pub struct Seldom {
     pub effect: &'static Effect,
     /// What it would be without these circumstances, in the catalogue that is searched or left out of it: never less likely.
     pub usual: &'static Effect,
+    /// Log odds of the circumstances.
+    pub log_odds: f64,
 }
 
 /// All of them.
-pub const SELDOM: &[Seldom] = &[Seldom { effect: &mass_shift::UNLOGGED, usual: &cg_offset::EFFECT }];
+///
+/// A log forgets more seldom than two rivals may be apart, so that no shift it lacks is a rival of what it imitates.
+pub const SELDOM: &[Seldom] = &[
+    Seldom { effect: &mass_shift::UNLOGGED, usual: &cg_offset::EFFECT, log_odds: -6.0 },
+    Seldom { effect: &mass_shift::LATE, usual: &mass_shift::EFFECT, log_odds: -3.0 },
+];
 
 /// The effect of an id.
 pub fn by_id(id: &str) -> Option<&'static Effect> {

@@ -22,8 +22,13 @@ impl Loudness {
     /// From the crew's sleep: so loud awake, and so loud asleep.
     pub fn of_crew([awake, asleep]: [f64; 2], sleeps: &[bool]) -> Self {
         let raw: Vec<f64> = sleeps.iter().map(|sleeps| if *sleeps { asleep } else { awake }).collect();
-        let rms = (raw.iter().map(|x| x * x).sum::<f64>() / raw.len().max(1) as f64).sqrt();
-        Self::even(raw.iter().map(|x| x / rms).collect())
+        Self::of_levels(&raw)
+    }
+
+    /// From a level for each window, of whatever mean square.
+    pub fn of_levels(levels: &[f64]) -> Self {
+        let rms = rms(levels);
+        Self::even(levels.iter().map(|level| level / rms).collect())
     }
 
     /// Level while the crew is awake, in the mean of squares; that of all windows where it never is.

@@ -1,12 +1,9 @@
 //! What is searched: a catalogue effect or an open form, at its starting points, with its priors. Not here: whitening, and which is best.
 
-use crate::diagnose::catalogue::{Effect, LOG_PRIOR, Nonlinear, SELDOM_LARGE, Scale, Shape, Theta};
+use crate::diagnose::catalogue::{Effect, LOG_PRIOR, Nonlinear, SELDOM_LARGE, Scale, Seldom, Shape, Theta};
 use crate::diagnose::open_form::SIZE_NG;
 use crate::diagnose::scene::Scene;
 use crate::math::shared_work;
-
-/// Log odds of circumstances that are rarer: by more than what two rivals may be apart, so that none is a rival of what it imitates.
-const LOG_SELDOM: f64 = -6.0;
 
 /// What a family is.
 #[derive(Clone, Copy)]
@@ -40,23 +37,22 @@ impl Entry {
         let at = |theta: &Theta| (effect.signature)(scene, theta).map(|shape| (*theta, shape));
         let points: Vec<(Theta, Shape)> = shared_work::map(&grid, at).into_iter().flatten().collect();
         (!points.is_empty()).then(|| Self {
-            log_prior: LOG_PRIOR,
             log_shares: log_shares(scene, effect, &points),
             points,
-            ..Self::without_points(effect)
+            ..Self::without_points(effect, 0.0)
         })
     }
 
     /// An effect under circumstances that are rarer.
-    pub fn seldom(scene: &Scene, effect: &'static Effect) -> Option<Self> {
-        Self::listed(scene, effect).map(|entry| Self { log_prior: LOG_PRIOR + LOG_SELDOM, ..entry })
+    pub fn seldom(scene: &Scene, seldom: &Seldom) -> Option<Self> {
+        Self::listed(scene, seldom.effect).map(|entry| Self { log_prior: LOG_PRIOR + seldom.log_odds, ..entry })
     }
 
-    /// The same without its starting points: to hold its place among others, or to be given some.
-    pub fn without_points(effect: &'static Effect) -> Self {
+    /// An effect, at log odds beside those of the others, without its starting points: to hold its place, or to be given some.
+    pub fn without_points(effect: &'static Effect, log_odds: f64) -> Self {
         Self {
             family: Family::Listed(effect),
-            log_prior: LOG_PRIOR + LOG_SELDOM,
+            log_prior: LOG_PRIOR + log_odds,
             points: Vec::new(),
             log_shares: Vec::new(),
             sizes: effect.linear.iter().map(|l| l.prior().size).collect(),

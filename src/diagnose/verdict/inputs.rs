@@ -77,20 +77,36 @@ fn misspelt(kind: &str) -> Option<String> {
 
 /// Deviations and a log that the windows contradict, and values out of the ordinary.
 fn of_the_noise(scene: &Scene) -> Vec<String> {
+    let axes = || ["x", "y", "z"].iter().zip(scene.contradicted);
     let mut notes = Vec::new();
-    for (axis, contradicted) in ["x", "y", "z"].iter().zip(scene.contradicted) {
-        match contradicted {
-            Some(Contradicted::Crew { said, shown }) => notes.push(format!(
+    for (axis, contradicted) in axes() {
+        if let Some(Contradicted::Crew { said, shown }) = contradicted {
+            notes.push(format!(
                 "the noise of axis {axis} is taken as {shown:.2} times as loud with the crew awake as asleep, which its windows show: \
                  their deviations say {said:.2}"
-            )),
-            Some(Contradicted::Stretches { quietest, loudest }) => notes.push(format!(
-                "the noise of axis {axis} is louder in some half hours than the crew's sleep and the deviations say, as its windows show: \
-                 {quietest:.2} to {loudest:.2} times the middle one, and is taken so"
-            )),
-            None => {}
+            ));
         }
     }
+    let listed = |of: fn(Contradicted) -> Option<[f64; 2]>| {
+        let one = |(axis, contradicted): (&&str, Option<Contradicted>)| {
+            let [quietest, loudest] = of(contradicted?)?;
+            Some(format!("{axis} {quietest:.2} to {loudest:.2}"))
+        };
+        let all: Vec<String> = axes().filter_map(one).collect();
+        (!all.is_empty()).then(|| all.join(", "))
+    };
+    notes.extend(listed(Contradicted::of_deviations).map(|levels| {
+        format!(
+            "the noise changes by more than the crew's sleep says: the deviations show when, the windows agree, and it is taken as so many \
+             times as loud as in the middle stretch: {levels}"
+        )
+    }));
+    notes.extend(listed(Contradicted::of_half_hours).map(|levels| {
+        format!(
+            "the noise is louder in some half hours than the crew's sleep and the deviations say, as the windows show, and is taken so, \
+             so many times as loud as in the middle one: {levels}"
+        )
+    }));
     let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
     if bursts > 0 {
         notes.push(format!(

@@ -19,6 +19,8 @@ use crate::physics::time::S_PER_DAY;
 /// explains.
 const HALF_HOUR_S: f64 = 1800.0;
 const HALF_HOURS: i32 = 24;
+/// Log odds of a log of another clock before anything is seen.
+const LOG_ODDS: f64 = -6.0;
 /// Log odds above what is found, of a hundred and fifty, from which it is told.
 const TOLD: f64 = 5.0;
 
@@ -52,7 +54,7 @@ pub fn of_another_clock(scene: &Scene, library: &Library, frame: &Frame, set: &S
     let mut points: [Vec<(Theta, Shape)>; LOGGED.len()] = Default::default();
     by_clock.into_iter().for_each(|of_clock| points.iter_mut().zip(of_clock).for_each(|(all, one)| all.extend(one)));
     let tried = |(effect, points): (&'static Effect, Vec<(Theta, Shape)>)| {
-        let entry = library.allows(effect).then(|| Entry::without_points(effect).at(points))??;
+        let entry = library.allows(effect).then(|| Entry::without_points(effect, LOG_ODDS).at(points))??;
         let seeds = seldom::seeds(set, library, &entry);
         let found = seldom::beside(frame, library, &seeds, &entry, library.entries.len())?;
         Some((found.members.last()?.theta[0], found.score - set.score, effect.id))

@@ -1,19 +1,18 @@
-//! How loud an axis is while the crew is awake, while it sleeps, and from half hour to half hour.
+//! How loud an axis is while the crew is awake, while it sleeps, and from hour to hour.
 //!
 //! The average deviations inside the windows and the log of sleep say so, but what is quick need not be in proportion to what a
 //! window's mean keeps, and who makes noise need not be in a log. So it is a claim, and tested on how the windows bend from one to the
 //! next, in which nothing slow has a share; where they contradict it, the likelier of both is taken, and told.
 
+mod changes;
+mod crew;
+mod deviations;
+mod half_hours;
+
 use super::{Loudness, Schedule, fit_and_likelihoods};
 
 /// Fewest windows asleep, awake, or of half an hour, for a level of their own.
 const FEWEST: usize = 30;
-/// Standard errors from which on the windows contradict the deviations.
-const CONTRADICTED: f64 = 4.0;
-/// Standard deviations of chi square from which on half hours differ.
-const UNEVEN: f64 = 8.0;
-/// Length of a stretch with a level of its own, s.
-const STRETCH_S: f64 = 1800.0;
 /// Evaluations of the fits that are compared.
 const EVALUATIONS: usize = 110;
 /// Longest step that counts: windows further apart differ by more than the quick noise.
@@ -22,7 +21,7 @@ const STEP_MAX_S: f64 = 60.0;
 /// independent.
 const OF_A_MEDIAN: f64 = 1.166 * std::f64::consts::SQRT_2;
 
-/// What is said of an axis, and its windows contradict.
+/// What is said of an axis by its log of sleep, and its deviations or its windows contradict.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Contradicted {
     /// How many times as loud it is awake as asleep.
@@ -32,8 +31,15 @@ pub enum Contradicted {
         /// By the windows.
         shown: f64,
     },
+    /// Some stretches are louder than others whatever the crew does, by the deviations, and the windows agree.
+    Deviations {
+        /// The quietest, beside the middle one.
+        quietest: f64,
+        /// The loudest.
+        loudest: f64,
+    },
     /// Some half hours are louder than others, whatever the crew does.
-    Stretches {
+    HalfHours {
         /// The quietest, beside the middle one.
         quietest: f64,
         /// The loudest.
@@ -41,16 +47,21 @@ pub enum Contradicted {
     },
 }
 
-/// Levels awake and asleep that the average deviations say; the same where they cannot.
-fn said(dev_ng: &[f64], sleeps: &[bool]) -> [f64; 2] {
-    let mean = |state: bool| {
-        let of_state = dev_ng.iter().zip(sleeps).filter(|(_, sleeps)| **sleeps == state);
-        let (sum, n) = of_state.fold((0.0, 0usize), |(s, n), (d, _)| (s + d, n + 1));
-        (n >= FEWEST && sum > 0.0).then(|| sum / n as f64)
-    };
-    match (mean(false), mean(true)) {
-        (Some(awake), Some(asleep)) => [awake, asleep],
-        _ => [1.0, 1.0],
+impl Contradicted {
+    /// The quietest and the loudest stretch by the deviations.
+    pub fn of_deviations(self) -> Option<[f64; 2]> {
+        match self {
+            Self::Deviations { quietest, loudest } => Some([quietest, loudest]),
+            _ => None,
+        }
+    }
+
+    /// The quietest and the loudest half hour by the windows.
+    pub fn of_half_hours(self) -> Option<[f64; 2]> {
+        match self {
+            Self::HalfHours { quietest, loudest } => Some([quietest, loudest]),
+            _ => None,
+        }
     }
 }
 
@@ -78,57 +89,6 @@ fn median(bends: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 /// A level that the windows show against the one said, and by how much likelier its noise must be.
 type Shown = (Loudness, Contradicted, f64);
 
-/// The levels awake and asleep, where the windows contradict those said.
-fn by_crew(residual_ng: &[f64], schedule: &Schedule, said: &Loudness, sleeps: &[bool]) -> Option<Shown> {
-    let all = bends(residual_ng, schedule, said);
-    let of = |state: bool| median(all.iter().filter(|(i, _)| sleeps[*i] == state).map(|(_, bend)| *bend));
-    let ((awake, e), (asleep, f)) = (of(false)?, of(true)?);
-    let level = |state: bool| sleeps.iter().position(|s| *s == state).map_or(1.0, |i| said.activity[i]);
-    let was = level(false) / level(true);
-    let now = was * awake / asleep;
-    let differ = (now / was).ln().abs() > CONTRADICTED * e.hypot(f);
-    differ.then(|| (Loudness::of_crew([now, 1.0], sleeps), Contradicted::Crew { said: was, shown: now }, 0.0))
-}
-
-/// The half hour of a window.
-fn stretch(schedule: &Schedule, i: usize) -> usize {
-    ((schedule.clock_s[i] - schedule.clock_s[0]) / STRETCH_S) as usize
-}
-
-/// How loud every half hour is beside the middle one, over how loud it is said to be: a logarithm, and its standard error.
-fn of_stretches(residual_ng: &[f64], schedule: &Schedule, said: &Loudness) -> Vec<Option<(f64, f64)>> {
-    let all = bends(residual_ng, schedule, said);
-    let Some((middle, _)) = median(all.iter().map(|(_, bend)| *bend)) else { return Vec::new() };
-    let mut of_stretches: Vec<Vec<f64>> = vec![Vec::new(); stretch(schedule, schedule.len() - 1) + 1];
-    all.iter().for_each(|(i, bend)| of_stretches[stretch(schedule, *i)].push(*bend));
-    let level = |bends: Vec<f64>| median(bends.into_iter()).map(|(size, error)| ((size / middle).ln(), error));
-    of_stretches.into_iter().map(level).collect()
-}
-
-/// Levels of half hours, whatever the crew does, where they differ beyond what is said: as far as they are known, each moved towards
-/// the middle one by its error (James and Stein 1961). The noise changes at some instant inside one of them, so that each is as loud as
-/// the louder of itself and those beside it. A level for each is bought by a likelihood that is higher by their number.
-fn by_stretch(residual_ng: &[f64], schedule: &Schedule, said: &Loudness) -> Option<Shown> {
-    let beyond = of_stretches(residual_ng, schedule, said);
-    let n = beyond.iter().flatten().count() as f64;
-    let chi2: f64 = beyond.iter().flatten().map(|(x, error)| (x / error).powi(2)).sum();
-    if n < 2.0 || chi2 < n + UNEVEN * (2.0 * n).sqrt() {
-        return None;
-    }
-    let levels = of_stretches(residual_ng, schedule, &Loudness::even(vec![1.0; schedule.len()]));
-    let level = |i: usize| {
-        let near = levels[i.saturating_sub(1)..(i + 2).min(levels.len())].iter().flatten();
-        let moved = near.map(|(x, error)| if x.abs() > *error { x - error * error / x } else { 0.0 });
-        moved.reduce(f64::max).unwrap_or(0.0).exp()
-    };
-    let levels: Vec<f64> = (0..levels.len()).map(level).collect();
-    let [quietest, loudest] = [f64::min, f64::max].map(|which| levels.iter().copied().reduce(which).unwrap_or(1.0));
-    let raw: Vec<f64> = (0..schedule.len()).map(|i| levels[stretch(schedule, i)]).collect();
-    let rms = (raw.iter().map(|x| x * x).sum::<f64>() / raw.len() as f64).sqrt();
-    let shown = Loudness::even(raw.iter().map(|x| x / rms).collect());
-    Some((shown, Contradicted::Stretches { quietest, loudest }, n))
-}
-
 /// How loud the windows of three axes are, from deviations, sleep and residual; and where the windows contradict that.
 pub fn settled(
     dev_ng: [&[f64]; 3],
@@ -136,16 +96,23 @@ pub fn settled(
     residual_ng: [&[f64]; 3],
     schedule: &Schedule,
 ) -> ([Loudness; 3], [Option<Contradicted>; 3]) {
-    let mut settled = dev_ng.map(|dev| (Loudness::of_crew(said(dev, sleeps), sleeps), None));
-    let crew = |k: usize, said: &Loudness| by_crew(residual_ng[k], schedule, said, sleeps);
-    let stretches = |k: usize, said: &Loudness| by_stretch(residual_ng[k], schedule, said);
-    decide(&mut settled, residual_ng, schedule, crew);
-    decide(&mut settled, residual_ng, schedule, stretches);
+    let mut settled = dev_ng.map(|dev| (Loudness::of_crew(crew::said(dev, sleeps), sleeps), None));
+    decide(&mut settled, residual_ng, schedule, |k, said| crew::by_crew(residual_ng[k], schedule, said, sleeps));
+    let begins = deviations::stretches(dev_ng, sleeps);
+    if begins.len() > 1 {
+        decide(&mut settled, residual_ng, schedule, |k, said| {
+            Some(deviations::by_deviations(dev_ng[k], residual_ng[k], schedule, said, &begins))
+        });
+    }
+    if (0..3).any(|k| half_hours::are_uneven(residual_ng[k], schedule, &settled[k].0)) {
+        decide(&mut settled, residual_ng, schedule, |k, _| half_hours::by_half_hours(residual_ng[k], schedule));
+    }
     let contradicted = settled.each_ref().map(|axis| axis.1);
     (settled.map(|axis| axis.0), contradicted)
 }
 
-/// Takes what the windows show where it makes the noise of an axis likelier than what was said.
+/// Takes what the windows show where it makes the noise of an axis likelier than what was said, by more than its price; where it does of
+/// one axis, what moves the vehicle moves the others too, and they have it for nothing.
 fn decide(
     settled: &mut [(Loudness, Option<Contradicted>); 3],
     residual_ng: [&[f64]; 3],
@@ -162,9 +129,12 @@ fn decide(
     };
     let before = likelihoods(settled.each_ref().map(|axis| &axis.0));
     let after = likelihoods(std::array::from_fn(|k| shown[k].as_ref().map_or(&settled[k].0, |shown| &shown.0)));
-    for (k, shown) in shown.into_iter().enumerate() {
-        if let Some((loudness, contradicted, by)) = shown
-            && after[k] > before[k] + by
+    let gains: [f64; 3] = std::array::from_fn(|k| after[k] - before[k]);
+    let is_shown = shown.iter().zip(gains).any(|(shown, gain)| shown.as_ref().is_some_and(|(_, _, by)| gain > *by));
+    for ((k, shown), gain) in shown.into_iter().enumerate().zip(gains) {
+        if let Some((loudness, contradicted, _)) = shown
+            && is_shown
+            && gain > 0.0
         {
             settled[k] = (loudness, Some(contradicted));
         }
@@ -257,7 +227,7 @@ mod tests {
             let (loudness, contradicted) =
                 settled([&dev_ng; 3], &never, residual.each_ref().map(|x| &x[..]), &schedule);
             for (loudness, contradicted) in loudness.iter().zip(contradicted) {
-                assert!(matches!(contradicted, Some(Contradicted::Stretches { .. })), "{contradicted:?}");
+                assert!(matches!(contradicted, Some(Contradicted::HalfHours { .. })), "{contradicted:?}");
                 let middle = |x: &[f64]| x[1000];
                 for i in (200..5000).step_by(100) {
                     let ratio = loudness.activity[i] / middle(&loudness.activity) * middle(&truth) / truth[i];

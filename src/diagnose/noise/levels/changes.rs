@@ -1,0 +1,107 @@
+//! Where the mean of a series changes: the likeliest stretches of even mean, each at a price (optimal partitioning, Jackson et al. 2005).
+
+/// Values that are taken together before the search, and apart again to place a change.
+const TOGETHER: usize = 4;
+/// Chi square by which a change must improve the fit: noise alone reaches it at one of two million places.
+const PRICE: f64 = 25.0;
+/// Median of the magnitude of a standard normal number.
+const OF_A_NORMAL: f64 = 0.6745;
+
+/// The first values of the stretches, 0 among them; noise correlated over fewer values than are taken together is allowed for.
+pub fn changes(series: &[f64]) -> Vec<usize> {
+    let bins: Vec<f64> = series.chunks_exact(TOGETHER).map(|bin| bin.iter().sum::<f64>() / TOGETHER as f64).collect();
+    let mut steps: Vec<f64> = bins.iter().zip(bins.iter().skip(2)).map(|(a, b)| (b - a).abs()).collect();
+    let (n, middle) = (bins.len(), steps.len() / 2);
+    if steps.is_empty() {
+        return vec![0];
+    }
+    let sigma = *steps.select_nth_unstable_by(middle, f64::total_cmp).1 / (OF_A_NORMAL * std::f64::consts::SQRT_2);
+    if !(sigma > 0.0) {
+        return vec![0];
+    }
+    let sums = Sums::of(&bins);
+    // Least cost of the bins before each, and where its last stretch begins.
+    let mut least = vec![(0.0, 0); n + 1];
+    for end in 1..=n {
+        let cost = |begin: usize| least[begin].0 + sums.scatter(begin, end) / (sigma * sigma) + PRICE;
+        least[end] =
+            (0..end).map(|begin| (cost(begin), begin)).fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a });
+    }
+    let mut begins = Vec::new();
+    let mut end = n;
+    while end > 0 {
+        end = least[end].1;
+        begins.push(end * TOGETHER);
+    }
+    begins.reverse();
+    placed(&Sums::of(series), begins, series.len())
+}
+
+/// The same, each moved by less than the values that were taken together to where the values on both sides scatter least.
+fn placed(sums: &Sums, mut begins: Vec<usize>, n: usize) -> Vec<usize> {
+    for i in 1..begins.len() {
+        let (from, to) = (begins[i - 1], begins.get(i + 1).copied().unwrap_or(n));
+        let near = begins[i].saturating_sub(TOGETHER).max(from + 1)..(begins[i] + TOGETHER).min(to);
+        let scatter = |at: &usize| sums.scatter(from, *at) + sums.scatter(*at, to);
+        begins[i] = near.min_by(|a, b| scatter(a).total_cmp(&scatter(b))).unwrap_or(begins[i]);
+    }
+    begins
+}
+
+/// Sums of values and of their squares up to each.
+struct Sums(Vec<[f64; 2]>);
+
+impl Sums {
+    fn of(values: &[f64]) -> Self {
+        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let mut sums = vec![[0.0; 2]];
+        let mut sum = [0.0; 2];
+        for x in values.iter().map(|x| x - mean) {
+            sum = [sum[0] + x, sum[1] + x * x];
+            sums.push(sum);
+        }
+        Self(sums)
+    }
+
+    /// Squares of the values from one to another about their mean.
+    fn scatter(&self, begin: usize, end: usize) -> f64 {
+        let [sum, squares] = [0, 1].map(|i| self.0[end][i] - self.0[begin][i]);
+        squares - sum * sum / (end - begin) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Numbers of which each shares half its samples with the next, two thirds of them noise.
+    fn overlapping(seed: u64, n: usize) -> Vec<f64> {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let halves: Vec<f64> = (0..=n).map(|_| StandardNormal.sample(&mut rng)).collect();
+        halves.windows(2).map(|pair: &[f64]| 0.15 * (pair[0] + pair[1])).collect()
+    }
+
+    #[test]
+    fn noise_alone_changes_nowhere() {
+        for seed in 0..100 {
+            assert_eq!(changes(&overlapping(seed, 6000)), [0], "{seed}");
+        }
+        assert_eq!(changes(&[]), [0]);
+        assert_eq!(changes(&[1.0; 400]), [0]);
+    }
+
+    #[test]
+    fn half_an_hour_that_is_louder_is_found_where_it_is() {
+        for seed in 0..20 {
+            let mut series = overlapping(seed, 6000);
+            series[3000..3072].iter_mut().for_each(|x| *x += 0.7);
+            series[5000..].iter_mut().for_each(|x| *x -= 0.3);
+            let found = changes(&series);
+            let near = |a: &usize, b: usize| a.abs_diff(b) <= 6;
+            assert!(found.len() == 4 && near(&found[1], 3000) && near(&found[2], 3072), "{seed}: {found:?}");
+            assert!(found[3].abs_diff(5000) < 40, "{seed}: {found:?}");
+        }
+    }
+}
