@@ -36,3 +36,29 @@ fn a_shift_of_mass_that_the_log_forgot_is_told_with_its_instant() {
         assert!(found.notes.iter().any(|note| note.contains("the log has no change of mass")), "{:?}", found.notes);
     }
 }
+
+/// A transfer goes on for a while: the log's entry is where it begins, and the shift that is fitted lies in its middle.
+#[test]
+fn a_logged_shift_of_mass_may_take_its_time() {
+    const EARLIER_S: f64 = 900.0;
+    for seed in [1_450_005, 1_450_014] {
+        let order = Order { kind: Kind::One, seed, only: Some("mass_shift"), manner: Manner::default() };
+        let concealed = draw_order(&order);
+        let onset_s = concealed.truth.effects["mass_shift"]["onset_s"].as_f64().unwrap();
+        let mut files = concealed.files.clone();
+        let (_, log) = files.iter_mut().find(|(name, _)| name == "events.csv").unwrap();
+        let text = String::from_utf8(log.clone()).unwrap();
+        let earlier = |line: &str| match line.split_once(',') {
+            Some((at, rest)) if line.contains("mass_change") => {
+                format!("{:.1},{rest}", at.parse::<f64>().unwrap() - EARLIER_S)
+            }
+            _ => line.to_owned(),
+        };
+        *log = text.split_inclusive('\n').map(earlier).collect::<String>().into();
+        let found = diagnose(&super::case(&files), &Settings::default()).unwrap();
+        assert_eq!(super::ids(&found), ["mass_shift"], "{seed}: {found:?}");
+        let told = found.effects[0].parameters.iter().find(|p| p.name == "onset_s").unwrap();
+        assert!((told.value - onset_s).abs() < 3.5 * told.sigma && told.sigma < 200.0, "{seed}: {onset_s}, {told:?}");
+        assert!(found.notes.iter().any(|note| note.contains("that goes on for a while")), "{:?}", found.notes);
+    }
+}

@@ -52,7 +52,7 @@ pub const LATE: Effect = Effect {
     assumes: Some(|scene, theta| {
         let at = before(scene, theta[0])?;
         Some(format!(
-            "mass_shift: the change of mass that the log has at {at:.0} s is fitted {:.0} s later: one is taken that goes on for a while",
+            "the change of mass that the log has at {at:.0} s is fitted {:.0} s later: one is taken that goes on for a while",
             theta[0] - at
         ))
     }),
