@@ -47,6 +47,9 @@ pub struct Args {
     /// One half window in a hundred is ten times as loud; the SNR does not know of it.
     #[arg(long)]
     bursts: bool,
+    /// Four times a day the noise is up to four times as loud, for half an hour to two and a half: only the deviations say so.
+    #[arg(long, conflicts_with = "dump")]
+    storms: bool,
     /// Every recording is a dump of the payload recorder, from an instrument of its own; only accelerations are concealed in it.
     #[arg(long)]
     dump: bool,
@@ -118,14 +121,14 @@ fn concealed(args: &Args, engine: &Engine) -> anyhow::Result<Option<Vec<Outcome>
         (true, Some(id)) if effect::IDS.contains(&id) => vec![Kind::One],
         (true, Some(_)) => vec![Kind::Unknown],
     };
-    let Args { hours, other_physics, bursts, dump, .. } = *args;
+    let Args { hours, other_physics, bursts, storms, dump, .. } = *args;
     let wander = match (args.smooth, args.flicker, args.resonant) {
         (true, _, _) => Wander::Smooth,
         (_, true, _) => Wander::Flicker,
         (_, _, true) => Wander::Resonant,
         _ => Wander::Autoregression,
     };
-    let manner = Manner { hours, other_physics, wander, bursts, dump };
+    let manner = Manner { hours, other_physics, wander, bursts, storms, dump };
     let orders = run::plan(args.cases, args.seed, &kinds, manner, only);
     let progress = bar(orders.len(), "sealing");
     let seals = run::seal(&orders, &progress);

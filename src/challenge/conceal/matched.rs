@@ -6,7 +6,7 @@ use super::effect::{self, Drawn, Signal, apparent};
 use super::flight::{Flight, STEP_S};
 use super::force::{self, Air, Series};
 use super::noise::{Noise, Whitening};
-use super::record::{awake, window_means};
+use super::record::{activity, window_means};
 
 /// Below this SNR left, two effects count as the same to a record.
 pub const CONFUSABLE_SNR: f64 = 3.0;
@@ -35,7 +35,7 @@ pub type White = [Vec<f64>; 3];
 impl<'a> Matched<'a> {
     /// For the windows kept of a flight in this noise.
     pub fn new(flight: &'a Flight, noise: &Noise, kept: &[bool]) -> Self {
-        let awake = awake(flight);
+        let awake = activity(flight, noise);
         let whitenings: [Whitening; 3] = std::array::from_fn(|axis| noise.whitening(axis, &awake, kept));
         let ones = std::array::from_fn(|axis| whitenings[axis].apply(&vec![1.0; awake.len()]));
         Self { flight, whitenings, ones }

@@ -109,6 +109,8 @@ pub struct Manner {
     pub wander: Wander,
     /// Bursts in the noise, which the SNR does not know of.
     pub bursts: bool,
+    /// Hours in which the noise is louder, which no log has: only the deviations.
+    pub storms: bool,
     /// The recording is a dump of the payload recorder: the simulator's instrument feels what the flight has, calibrates itself, and
     /// every calibration is to be worked out from what it sends.
     pub dump: bool,
@@ -117,7 +119,14 @@ pub struct Manner {
 impl Default for Manner {
     /// As the open cases are.
     fn default() -> Self {
-        Self { hours: 36, other_physics: false, wander: Wander::Autoregression, bursts: false, dump: false }
+        Self {
+            hours: 36,
+            other_physics: false,
+            wander: Wander::Autoregression,
+            bursts: false,
+            storms: false,
+            dump: false,
+        }
     }
 }
 
@@ -279,6 +288,7 @@ impl Question {
             Wander::Resonant => "-resonant",
         };
         suffix += if order.manner.bursts { "-bursts" } else { "" };
+        suffix += if order.manner.storms { "-storms" } else { "" };
         suffix += if order.manner.dump { "-dump" } else { "" };
         let id = format!("{}-{:06}{suffix}", order.kind.word(), order.seed);
         let lacks_bulge = self.parts.iter().any(|(id, _, _)| id == "diurnal_bulge");

@@ -1,6 +1,6 @@
 //! The noise of a drawn record, and the exact whitening that belongs to it.
 //!
-//! Windows of 50 s every 25 s: each is the mean of two halves of white noise, `(h_k + h_(k-1)) / sqrt 2`, louder while the crew is
+//! Windows of 50 s every 25 s: each is the mean of two halves of white noise, `(h_k + h_(k-1)) / sqrt 2`, each louder while the crew is
 //! awake, with a little red noise in proportion, and on some records slow noise (minutes to hours) beside it. The same state
 //! model draws the noise and, as a Kalman filter, whitens signatures: SNR here is the true matched filter's, not an estimate.
 
@@ -9,6 +9,7 @@ use rand_chacha::ChaCha12Rng;
 use super::draw::{between, log_between, normal};
 use super::{Manner, Wander};
 use crate::diagnose::case::WINDOW_STRIDE_S;
+use crate::physics::time::S_PER_DAY;
 
 /// What the noise of one record is.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,7 +30,23 @@ pub struct Noise {
     pub wander: Wander,
     /// Whether one half window in a hundred is ten times as loud.
     pub bursts: bool,
+    /// Louder hours.
+    pub storms: Vec<Storm>,
 }
+
+/// A stretch that is louder, by the same on all axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Storm {
+    /// When it begins and ends, s since the start of the record.
+    pub span_s: [f64; 2],
+    /// How many times as loud it is.
+    pub louder: f64,
+}
+
+/// Storms a day, how long each lasts, s, and how many times as loud it is.
+const STORMS_PER_DAY: f64 = 4.0;
+const STORM_S: [f64; 2] = [1800.0, 9000.0];
+const STORM_LOUDER: [f64; 2] = [1.5, 4.0];
 
 /// Largest deviation of slow noise, ng, as the acceptance has it. Noise that shares it among octaves, and noise that resonates, which is
 /// quicker, have twice as much.
@@ -48,7 +65,7 @@ impl Noise {
             Wander::Flicker | Wander::Resonant => 2.0 * SLOW_NG,
         };
         let slow_ng = std::array::from_fn(|_| if slow { between(rng, 5.0, largest_ng) } else { 0.0 });
-        Self {
+        let mut noise = Self {
             awake_ng,
             asleep: between(rng, 0.55, 0.68),
             red_share: between(rng, 0.0, 0.06),
@@ -57,23 +74,45 @@ impl Noise {
             slow_s: log_between(rng, 300.0, 10_800.0),
             wander: manner.wander,
             bursts: manner.bursts,
+            storms: Vec::new(),
+        };
+        if manner.storms {
+            let length_s = 3600.0 * f64::from(manner.hours);
+            let number = (STORMS_PER_DAY * length_s / S_PER_DAY).round() as usize;
+            let mut storm = || {
+                let from_s = between(rng, 0.0, length_s);
+                let span_s = [from_s, from_s + log_between(rng, STORM_S[0], STORM_S[1])];
+                Storm { span_s, louder: log_between(rng, STORM_LOUDER[0], STORM_LOUDER[1]) }
+            };
+            noise.storms = (0..number).map(|_| storm()).collect();
         }
+        noise
     }
 
-    /// One series of `windows` values for an axis; `awake` in 0..=1 scales between the two levels.
+    /// How active the crew seems by how loud it is so many seconds into the record: 1 awake, 0 asleep, more in a storm.
+    pub fn activity(&self, awake: bool, at_s: f64) -> f64 {
+        let here = self.storms.iter().filter(|storm| (storm.span_s[0]..storm.span_s[1]).contains(&at_s));
+        let louder = here.map(|storm| storm.louder).fold(1.0, f64::max);
+        let level = if awake { 1.0 } else { self.asleep };
+        (level * louder - self.asleep) / (1.0 - self.asleep)
+    }
+
+    /// One series for an axis, a value for each activity of the samples that a window is the first to have: 0 asleep, 1 awake.
     pub fn series(&self, rng: &mut ChaCha12Rng, axis: usize, awake: &[f64]) -> Vec<f64> {
         let (white, red) = ((1.0 - self.red_share).sqrt(), self.red_share.sqrt());
         let red_keep = keep(self.red_s);
         let (mut before, mut red_now) = (normal(rng), normal(rng));
         let mut slow = Slow::new(rng, self);
         let mut series = Vec::with_capacity(awake.len());
+        let mut level_before = self.level_ng(axis, awake.first().copied().unwrap_or(1.0));
         for awake in awake {
             let is_burst = self.bursts && between(rng, 0.0, 1.0) < BURSTS[0];
             let half = normal(rng) * if is_burst { BURSTS[1] } else { 1.0 };
             red_now = red_keep * red_now + (1.0 - red_keep * red_keep).sqrt() * normal(rng);
-            let quick = white * (half + before) / 2f64.sqrt() + red * red_now;
-            series.push(self.level_ng(axis, *awake) * quick + self.slow_ng[axis] * slow.next(rng));
-            before = half;
+            let level = self.level_ng(axis, *awake);
+            let quick = white * (level * half + level_before * before) / 2f64.sqrt() + level * red * red_now;
+            series.push(quick + self.slow_ng[axis] * slow.next(rng));
+            (before, level_before) = (half, level);
         }
         series
     }
@@ -98,13 +137,15 @@ impl Noise {
         for (i, row) in p.iter_mut().enumerate() {
             row[i] = 1.0;
         }
+        let mut level_before = self.level_ng(axis, awake.first().copied().unwrap_or(1.0));
         let steps = awake
             .iter()
             .zip(kept)
             .map(|(awake, kept)| {
                 p = predict(&p, keep);
                 let level = self.level_ng(axis, *awake);
-                let h = [level * white, level * white, level * red, self.slow_ng[axis]];
+                let h = [level * white, level_before * white, level * red, self.slow_ng[axis]];
+                level_before = level;
                 if !kept {
                     return Step { h, gain: [0.0; 4], sigma: f64::INFINITY };
                 }
@@ -283,9 +324,11 @@ mod tests {
     #[test]
     fn whitened_noise_is_white_and_of_unit_variance() {
         let mut rng = ChaCha12Rng::seed_from_u64(1);
-        let noise = Noise::draw(&mut rng, true, Manner::default());
+        let noise = Noise::draw(&mut rng, true, Manner { hours: 280, storms: true, ..Manner::default() });
+        assert_eq!(noise.storms.len(), 47);
         let windows = 40_000;
-        let awake: Vec<f64> = (0..windows).map(|k| f64::from(u8::from(k % 3456 > 1152))).collect();
+        let activity = |k: usize| noise.activity(k % 3456 > 1152, WINDOW_STRIDE_S * k as f64);
+        let awake: Vec<f64> = (0..windows).map(activity).collect();
         let kept: Vec<bool> = (0..windows).map(|k| k % 600 > 38).collect();
         let series = noise.series(&mut rng, 0, &awake);
         let white = noise.whitening(0, &awake, &kept).apply(&series);

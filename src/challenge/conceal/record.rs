@@ -38,13 +38,14 @@ pub fn window_means(flight: &Flight, series: &[Vector3<f64>]) -> [Vec<f64>; 3] {
     })
 }
 
-/// 1 awake, 0 asleep, at each window.
-pub fn awake(flight: &Flight) -> Vec<f64> {
+/// How active the crew seems about the middle of the samples that each window is the first to have.
+pub fn activity(flight: &Flight, noise: &Noise) -> Vec<f64> {
     let asleep = |t: f64| {
         let nights = flight.events.iter().filter(|e| e.kind == "crew_sleep");
         nights.into_iter().any(|e| t >= e.clock_s && t < e.clock_s + e.duration_s)
     };
-    centres_s(flight).into_iter().map(|t| if asleep(t) { 0.0 } else { 1.0 }).collect()
+    let middles_s = centres_s(flight).into_iter().map(|t| t + 0.5 * WINDOW_STRIDE_S);
+    middles_s.map(|t| noise.activity(!asleep(t), t - flight.start_s)).collect()
 }
 
 /// Which windows arrive: calibrations every 4.18 h take 16 or 42 minutes, and a few stretches are lost.
@@ -79,7 +80,7 @@ pub struct Recording {
 /// What the sensor feels as calibrated windows, with noise and a constant that a bias fit would leave.
 pub fn windows(rng: &mut ChaCha12Rng, question: &Question) -> Recording {
     let Question { flight, felt, noise, kept, .. } = question;
-    let awake = awake(flight);
+    let awake = activity(flight, noise);
     let means = window_means(flight, felt);
     let drawn: [Vec<f64>; 3] = std::array::from_fn(|axis| noise.series(rng, axis, &awake));
     let bias = Vector3::from_fn(|_, _| 60.0 * normal(rng));
@@ -126,12 +127,14 @@ pub fn files(
 fn deviations(rng: &mut ChaCha12Rng, noise: &Noise, awake: &[f64]) -> [Vec<f64>; 3] {
     std::array::from_fn(|axis| {
         let mut before = between(rng, 0.1, 1.9);
+        let mut level_before = noise.level_ng(axis, awake[0]);
         awake
             .iter()
             .map(|awake| {
                 let half = between(rng, 0.1, 1.9);
-                let dev = 4.0 * noise.level_ng(axis, *awake) * 0.5 * (half + before);
-                before = half;
+                let level = noise.level_ng(axis, *awake);
+                let dev = 4.0 * 0.5 * (level * half + level_before * before);
+                (before, level_before) = (half, level);
                 dev
             })
             .collect()

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha12Rng;
 
 use super::flight::{Flight, STEP_S};
 use super::noise::Noise;
-use super::record::{Recording, awake, centres_s, kept_of};
+use super::record::{Recording, activity, centres_s, kept_of};
 use super::{Question, effect};
 use crate::diagnose::case::{HALF_WINDOW_S, WINDOW_STRIDE_S};
 use crate::ingest::wire::LinkConfig;
@@ -94,7 +94,7 @@ impl Tape {
         let link = LinkConfig::default();
         let frames = frames(simulate::Flight::new(&self.config, &felt), link);
         let passes = playbacks(&frames, &link, &RecorderConfig::clean(), self.config.seed);
-        let awake = awake(flight);
+        let awake = activity(flight, noise);
         let level = |axis: usize| -> Vec<f64> { awake.iter().map(|awake| noise.level_ng(axis, *awake)).collect() };
         Recording {
             kind: "recorder_dump",
