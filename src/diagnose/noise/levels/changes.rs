@@ -1,7 +1,9 @@
 //! Where the mean of a series changes: the likeliest stretches of even mean, each at a price (optimal partitioning, Jackson et al. 2005).
 
-/// Values that are taken together before the search, and apart again to place a change.
+/// Values that are taken together before the search, and apart again to place a change; more of very long series.
 const TOGETHER: usize = 4;
+/// Most bins of those: the search takes time by their square.
+const BINS_MAX: usize = 10_000;
 /// Chi square by which a change must improve the fit: noise alone reaches it at one of two million places.
 const PRICE: f64 = 25.0;
 /// Median of the magnitude of a standard normal number.
@@ -9,7 +11,8 @@ const OF_A_NORMAL: f64 = 0.6745;
 
 /// The first values of the stretches, 0 among them; noise correlated over fewer values than are taken together is allowed for.
 pub fn changes(series: &[f64]) -> Vec<usize> {
-    let bins: Vec<f64> = series.chunks_exact(TOGETHER).map(|bin| bin.iter().sum::<f64>() / TOGETHER as f64).collect();
+    let together = TOGETHER.max(series.len().div_ceil(BINS_MAX));
+    let bins: Vec<f64> = series.chunks_exact(together).map(|bin| bin.iter().sum::<f64>() / together as f64).collect();
     let mut steps: Vec<f64> = bins.iter().zip(bins.iter().skip(2)).map(|(a, b)| (b - a).abs()).collect();
     let (n, middle) = (bins.len(), steps.len() / 2);
     if steps.is_empty() {
@@ -31,17 +34,17 @@ pub fn changes(series: &[f64]) -> Vec<usize> {
     let mut end = n;
     while end > 0 {
         end = least[end].1;
-        begins.push(end * TOGETHER);
+        begins.push(end * together);
     }
     begins.reverse();
-    placed(&Sums::of(series), begins, series.len())
+    placed(&Sums::of(series), begins, together, series.len())
 }
 
 /// The same, each moved by less than the values that were taken together to where the values on both sides scatter least.
-fn placed(sums: &Sums, mut begins: Vec<usize>, n: usize) -> Vec<usize> {
+fn placed(sums: &Sums, mut begins: Vec<usize>, together: usize, n: usize) -> Vec<usize> {
     for i in 1..begins.len() {
         let (from, to) = (begins[i - 1], begins.get(i + 1).copied().unwrap_or(n));
-        let near = begins[i].saturating_sub(TOGETHER).max(from + 1)..(begins[i] + TOGETHER).min(to);
+        let near = begins[i].saturating_sub(together).max(from + 1)..(begins[i] + together).min(to);
         let scatter = |at: &usize| sums.scatter(from, *at) + sums.scatter(*at, to);
         begins[i] = near.min_by(|a, b| scatter(a).total_cmp(&scatter(b))).unwrap_or(begins[i]);
     }
@@ -90,6 +93,14 @@ mod tests {
         }
         assert_eq!(changes(&[]), [0]);
         assert_eq!(changes(&[1.0; 400]), [0]);
+    }
+
+    #[test]
+    fn a_change_in_a_series_of_a_year_is_found() {
+        let mut series = overlapping(1, 1_260_000);
+        series[400_000..410_000].iter_mut().for_each(|x| *x += 0.3);
+        let found = changes(&series);
+        assert!(found.len() == 3 && found[1].abs_diff(400_000) < 100 && found[2].abs_diff(410_000) < 100, "{found:?}");
     }
 
     #[test]
