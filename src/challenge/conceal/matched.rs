@@ -35,9 +35,9 @@ pub type White = [Vec<f64>; 3];
 impl<'a> Matched<'a> {
     /// For the windows kept of a flight in this noise.
     pub fn new(flight: &'a Flight, noise: &Noise, kept: &[bool]) -> Self {
-        let awake = activity(flight, noise);
-        let whitenings: [Whitening; 3] = std::array::from_fn(|axis| noise.whitening(axis, &awake, kept));
-        let ones = std::array::from_fn(|axis| whitenings[axis].apply(&vec![1.0; awake.len()]));
+        let activity = activity(flight, noise);
+        let whitenings: [Whitening; 3] = std::array::from_fn(|axis| noise.whitening(axis, &activity, kept));
+        let ones = std::array::from_fn(|axis| whitenings[axis].apply(&vec![1.0; activity.len()]));
         Self { flight, whitenings, ones }
     }
 

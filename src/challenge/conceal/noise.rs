@@ -98,18 +98,18 @@ impl Noise {
     }
 
     /// One series for an axis, a value for each activity of the samples that a window is the first to have: 0 asleep, 1 awake.
-    pub fn series(&self, rng: &mut ChaCha12Rng, axis: usize, awake: &[f64]) -> Vec<f64> {
+    pub fn series(&self, rng: &mut ChaCha12Rng, axis: usize, activity: &[f64]) -> Vec<f64> {
         let (white, red) = ((1.0 - self.red_share).sqrt(), self.red_share.sqrt());
         let red_keep = keep(self.red_s);
         let (mut before, mut red_now) = (normal(rng), normal(rng));
         let mut slow = Slow::new(rng, self);
-        let mut series = Vec::with_capacity(awake.len());
-        let mut level_before = self.level_ng(axis, awake.first().copied().unwrap_or(1.0));
-        for awake in awake {
+        let mut series = Vec::with_capacity(activity.len());
+        let mut level_before = self.level_ng(axis, activity.first().copied().unwrap_or(1.0));
+        for now in activity {
             let is_burst = self.bursts && between(rng, 0.0, 1.0) < BURSTS[0];
             let half = normal(rng) * if is_burst { BURSTS[1] } else { 1.0 };
             red_now = red_keep * red_now + (1.0 - red_keep * red_keep).sqrt() * normal(rng);
-            let level = self.level_ng(axis, *awake);
+            let level = self.level_ng(axis, *now);
             let quick = white * (level * half + level_before * before) / 2f64.sqrt() + level * red * red_now;
             series.push(quick + self.slow_ng[axis] * slow.next(rng));
             (before, level_before) = (half, level);
@@ -124,12 +124,12 @@ impl Noise {
     }
 
     /// Standard deviation of the quick part, ng.
-    pub fn level_ng(&self, axis: usize, awake: f64) -> f64 {
-        self.awake_ng[axis] * (self.asleep + (1.0 - self.asleep) * awake)
+    pub fn level_ng(&self, axis: usize, activity: f64) -> f64 {
+        self.awake_ng[axis] * (self.asleep + (1.0 - self.asleep) * activity)
     }
 
     /// The whitening of one axis: for the windows present (`kept`) of the whole grid.
-    pub fn whitening(&self, axis: usize, awake: &[f64], kept: &[bool]) -> Whitening {
+    pub fn whitening(&self, axis: usize, activity: &[f64], kept: &[bool]) -> Whitening {
         // State: h_k, h_(k-1), red, slow, all of unit variance.
         let (white, red) = ((1.0 - self.red_share).sqrt() / 2f64.sqrt(), self.red_share.sqrt());
         let keep = [keep(self.red_s), keep(self.slow_s)];
@@ -137,13 +137,13 @@ impl Noise {
         for (i, row) in p.iter_mut().enumerate() {
             row[i] = 1.0;
         }
-        let mut level_before = self.level_ng(axis, awake.first().copied().unwrap_or(1.0));
-        let steps = awake
+        let mut level_before = self.level_ng(axis, activity.first().copied().unwrap_or(1.0));
+        let steps = activity
             .iter()
             .zip(kept)
-            .map(|(awake, kept)| {
+            .map(|(now, kept)| {
                 p = predict(&p, keep);
-                let level = self.level_ng(axis, *awake);
+                let level = self.level_ng(axis, *now);
                 let h = [level * white, level_before * white, level * red, self.slow_ng[axis]];
                 level_before = level;
                 if !kept {

@@ -80,11 +80,11 @@ pub struct Recording {
 /// What the sensor feels as calibrated windows, with noise and a constant that a bias fit would leave.
 pub fn windows(rng: &mut ChaCha12Rng, question: &Question) -> Recording {
     let Question { flight, felt, noise, kept, .. } = question;
-    let awake = activity(flight, noise);
+    let activity = activity(flight, noise);
     let means = window_means(flight, felt);
-    let drawn: [Vec<f64>; 3] = std::array::from_fn(|axis| noise.series(rng, axis, &awake));
+    let drawn: [Vec<f64>; 3] = std::array::from_fn(|axis| noise.series(rng, axis, &activity));
     let bias = Vector3::from_fn(|_, _| 60.0 * normal(rng));
-    let dev = deviations(rng, noise, &awake);
+    let dev = deviations(rng, noise, &activity);
     let mut recording = String::from("clock_s,ax_ng,ay_ng,az_ng,dev_x_ng,dev_y_ng,dev_z_ng\n");
     for (w, t) in centres_s(flight).into_iter().enumerate().filter(|(w, _)| kept[*w]) {
         let a: [f64; 3] = std::array::from_fn(|i| means[i][w] + drawn[i][w] + bias[i]);
@@ -124,15 +124,15 @@ pub fn files(
 }
 
 /// Average deviation in each window: about four times the mean's noise, and as scattered as on the open cases.
-fn deviations(rng: &mut ChaCha12Rng, noise: &Noise, awake: &[f64]) -> [Vec<f64>; 3] {
+fn deviations(rng: &mut ChaCha12Rng, noise: &Noise, activity: &[f64]) -> [Vec<f64>; 3] {
     std::array::from_fn(|axis| {
         let mut before = between(rng, 0.1, 1.9);
-        let mut level_before = noise.level_ng(axis, awake[0]);
-        awake
+        let mut level_before = noise.level_ng(axis, activity[0]);
+        activity
             .iter()
-            .map(|awake| {
+            .map(|now| {
                 let half = between(rng, 0.1, 1.9);
-                let level = noise.level_ng(axis, *awake);
+                let level = noise.level_ng(axis, *now);
                 let dev = 4.0 * 0.5 * (level * half + level_before * before);
                 (before, level_before) = (half, level);
                 dev

@@ -94,8 +94,8 @@ impl Tape {
         let link = LinkConfig::default();
         let frames = frames(simulate::Flight::new(&self.config, &felt), link);
         let passes = playbacks(&frames, &link, &RecorderConfig::clean(), self.config.seed);
-        let awake = activity(flight, noise);
-        let level = |axis: usize| -> Vec<f64> { awake.iter().map(|awake| noise.level_ng(axis, *awake)).collect() };
+        let activity = activity(flight, noise);
+        let level = |axis: usize| -> Vec<f64> { activity.iter().map(|now| noise.level_ng(axis, *now)).collect() };
         Recording {
             kind: "recorder_dump",
             file: "recording.dump",

@@ -1,5 +1,7 @@
 //! Where the mean of a series changes: the likeliest stretches of even mean, each at a price (optimal partitioning, Jackson et al. 2005).
 
+use crate::math::robust::median;
+
 /// Values that are taken together before the search, and apart again to place a change; more of very long series.
 const TOGETHER: usize = 4;
 /// Most bins of those: the search takes time by their square.
@@ -14,12 +16,9 @@ pub fn changes(series: &[f64]) -> Vec<usize> {
     let together = TOGETHER.max(series.len().div_ceil(BINS_MAX));
     let bins: Vec<f64> = series.chunks_exact(together).map(|bin| bin.iter().sum::<f64>() / together as f64).collect();
     let mut steps: Vec<f64> = bins.iter().zip(bins.iter().skip(2)).map(|(a, b)| (b - a).abs()).collect();
-    let (n, middle) = (bins.len(), steps.len() / 2);
-    if steps.is_empty() {
-        return vec![0];
-    }
-    let sigma = *steps.select_nth_unstable_by(middle, f64::total_cmp).1 / (OF_A_NORMAL * std::f64::consts::SQRT_2);
-    if !(sigma > 0.0) {
+    let n = bins.len();
+    let sigma = median(&mut steps).unwrap_or(0.0) / (OF_A_NORMAL * std::f64::consts::SQRT_2);
+    if sigma <= 0.0 {
         return vec![0];
     }
     let sums = Sums::of(&bins);

@@ -3,36 +3,56 @@
 use super::changes::changes;
 use super::{Contradicted, Shown, bends, median};
 use crate::diagnose::noise::{Loudness, Schedule};
+use crate::math::robust;
 
 /// Standard deviation of the logarithm of how loud a stretch is about what its deviations say.
 const OF_DEVIATIONS: f64 = 0.15;
 
-/// Stretches that are louder or quieter by their deviations than the crew's sleep says, the same for all axes, by their first windows;
-/// none without deviations.
-pub(super) fn stretches(dev_ng: [&[f64]; 3], sleeps: &[bool]) -> Vec<usize> {
-    if dev_ng.iter().any(|dev| dev.iter().any(|dev| *dev <= 0.0)) {
-        return vec![0];
+/// Logarithms of the deviations of an axis; a window that has none has that of the last before it that has one, and where most have none
+/// there are none.
+fn logarithms(dev_ng: &[f64]) -> Option<Vec<f64>> {
+    let known = || dev_ng.iter().filter(|dev| **dev > 0.0);
+    if 2 * known().count() <= dev_ng.len() {
+        return None;
     }
-    let logarithm = |i: usize| dev_ng.iter().map(|dev| dev[i].ln()).sum::<f64>() / 3.0;
-    let all: Vec<f64> = (0..sleeps.len()).map(logarithm).collect();
-    let middle = |state: bool| {
-        let mut of_state: Vec<f64> = all.iter().zip(sleeps).filter(|(_, s)| **s == state).map(|(x, _)| *x).collect();
-        let middle = of_state.len() / 2;
-        if of_state.is_empty() { 0.0 } else { *of_state.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    let mut last = *known().next()?;
+    let or_last = |dev: &f64| {
+        last = if *dev > 0.0 { *dev } else { last };
+        last.ln()
     };
-    let middles = [middle(false), middle(true)];
+    Some(dev_ng.iter().map(or_last).collect())
+}
+
+/// Stretches that are louder or quieter by their deviations than the crew's sleep says, the same for all axes.
+pub(super) struct Stretches {
+    /// First window of each.
+    begins: Vec<usize>,
+    /// Logarithms of the deviations of every axis.
+    logarithms: [Vec<f64>; 3],
+}
+
+/// Where the deviations set stretches apart; `None` where there are no deviations, or no more than one stretch.
+pub(super) fn stretches(dev_ng: [&[f64]; 3], sleeps: &[bool]) -> Option<Stretches> {
+    let [x, y, z] = dev_ng.map(logarithms);
+    let logarithms = [x?, y?, z?];
+    let all: Vec<f64> = (0..sleeps.len()).map(|i| logarithms.iter().map(|axis| axis[i]).sum::<f64>() / 3.0).collect();
+    let middles = [false, true].map(|state| {
+        let of_state = all.iter().zip(sleeps).filter(|(_, sleeps)| **sleeps == state).map(|(x, _)| *x);
+        robust::median(&mut of_state.collect::<Vec<f64>>()).unwrap_or(0.0)
+    });
     let beyond: Vec<f64> = all.iter().zip(sleeps).map(|(x, sleeps)| x - middles[usize::from(*sleeps)]).collect();
-    changes(&beyond)
+    let begins = changes(&beyond);
+    (begins.len() > 1).then_some(Stretches { begins, logarithms })
 }
 
 /// Levels of such stretches beside what is said: what their deviations say, moved towards what their windows show by the errors of
 /// both. Windows at an edge are as loud as the louder side.
 pub(super) fn by_deviations(
-    dev_ng: &[f64],
+    Stretches { begins, logarithms }: &Stretches,
+    axis: usize,
     residual_ng: &[f64],
     schedule: &Schedule,
     said: &Loudness,
-    begins: &[usize],
 ) -> Shown {
     let n = schedule.len();
     let stretch = |i: usize| begins.partition_point(|begin| *begin <= i) - 1;
@@ -42,7 +62,7 @@ pub(super) fn by_deviations(
         bends_of.into_iter().map(|bends| median(bends.into_iter()).map(|(size, error)| (size.ln(), error))).collect();
     let ends = begins[1..].iter().copied().chain([n]);
     let mean = |(begin, end): (&usize, usize)| {
-        (*begin..end).map(|i| (dev_ng[i] / said.activity[i]).ln()).sum::<f64>() / (end - begin) as f64
+        (*begin..end).map(|i| logarithms[axis][i] - said.activity[i].ln()).sum::<f64>() / (end - begin) as f64
     };
     let of_dev: Vec<f64> = begins.iter().zip(ends).map(mean).collect();
     // How much more a bend is than a deviation: the mean over the stretches, each by its error.
@@ -69,4 +89,32 @@ pub(super) fn by_deviations(
     let [quietest, loudest] = [0, sorted.len() - 1].map(|i| (sorted[i] - sorted[sorted.len() / 2]).exp());
     // Where the stretches are the windows did not choose, and of how loud they are they chose a part.
     (Loudness::of_levels(&raw), Contradicted::Deviations { quietest, loudest }, begins.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// Two hours three times as loud, and some windows without a deviation.
+    #[test]
+    fn windows_without_a_deviation_hide_no_stretch() {
+        let dev_ng = |missing: usize| -> Vec<f64> {
+            let loud = |i: usize| if (2000..2288).contains(&i) { 300.0 } else { 100.0 };
+            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+            let mut scatter = || -> f64 { StandardNormal.sample(&mut rng) };
+            let of = |i: usize| if i % 100 < missing { 0.0 } else { loud(i) * (0.3 * scatter()).exp() };
+            (0..4000).map(of).collect()
+        };
+        let begins = |missing: usize| {
+            let dev_ng = dev_ng(missing);
+            stretches([&dev_ng; 3], &[false; 4000]).map(|found| found.begins)
+        };
+        for missing in [0, 3] {
+            let begins = begins(missing).unwrap();
+            assert!(begins.len() == 3 && begins[1].abs_diff(2000) < 6 && begins[2].abs_diff(2288) < 6, "{begins:?}");
+        }
+        assert!(begins(60).is_none());
+    }
 }

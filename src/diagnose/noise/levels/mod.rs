@@ -98,10 +98,9 @@ pub fn settled(
 ) -> ([Loudness; 3], [Option<Contradicted>; 3]) {
     let mut settled = dev_ng.map(|dev| (Loudness::of_crew(crew::said(dev, sleeps), sleeps), None));
     decide(&mut settled, residual_ng, schedule, |k, said| crew::by_crew(residual_ng[k], schedule, said, sleeps));
-    let begins = deviations::stretches(dev_ng, sleeps);
-    if begins.len() > 1 {
+    if let Some(stretches) = deviations::stretches(dev_ng, sleeps) {
         decide(&mut settled, residual_ng, schedule, |k, said| {
-            Some(deviations::by_deviations(dev_ng[k], residual_ng[k], schedule, said, &begins))
+            Some(deviations::by_deviations(&stretches, k, residual_ng[k], schedule, said))
         });
     }
     if (0..3).any(|k| half_hours::are_uneven(residual_ng[k], schedule, &settled[k].0)) {
