@@ -1,6 +1,9 @@
-//! Where the mean of a series changes: the likeliest stretches of even mean, each at a price (optimal partitioning, Jackson et al. 2005).
+//! Where the mean of a series changes: the likeliest stretches of even mean, each at a price (PELT, Killick, Fearnhead and Eckley 2012,
+//! exact among every so many values), and then each change where the values on both sides scatter least.
 
 use crate::math::robust::median;
+use pelt::{Pelt, SegmentCostFunction};
+use std::num::NonZero;
 
 /// Values that are taken together before the search, and apart again to place a change; more of very long series.
 const TOGETHER: usize = 4;
@@ -16,26 +19,17 @@ pub fn changes(series: &[f64]) -> Vec<usize> {
     let together = TOGETHER.max(series.len().div_ceil(BINS_MAX));
     let bins: Vec<f64> = series.chunks_exact(together).map(|bin| bin.iter().sum::<f64>() / together as f64).collect();
     let mut steps: Vec<f64> = bins.iter().zip(bins.iter().skip(2)).map(|(a, b)| (b - a).abs()).collect();
-    let n = bins.len();
     let sigma = median(&mut steps).unwrap_or(0.0) / (OF_A_NORMAL * std::f64::consts::SQRT_2);
     if sigma <= 0.0 {
         return vec![0];
     }
-    let sums = Sums::of(&bins);
-    // Least cost of the bins before each, and where its last stretch begins.
-    let mut least = vec![(0.0, 0); n + 1];
-    for end in 1..=n {
-        let cost = |begin: usize| least[begin].0 + sums.scatter(begin, end) / (sigma * sigma) + PRICE;
-        least[end] =
-            (0..end).map(|begin| (cost(begin), begin)).fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a });
-    }
-    let mut begins = Vec::new();
-    let mut end = n;
-    while end > 0 {
-        end = least[end].1;
-        begins.push(end * together);
-    }
-    begins.reverse();
+    let Some(jump) = NonZero::new(together) else { return vec![0] };
+    // The crate takes no stretch shorter than a jump: with a jump of one it gives nothing but an error.
+    let search = Pelt::new().with_jump(jump).with_minimum_segment_length(jump);
+    let search = search.with_segment_cost_function(SegmentCostFunction::L2);
+    let ends = search.predict(series, PRICE * sigma * sigma * together as f64).unwrap_or_default();
+    let inner = ends.split_last().map_or(&[][..], |(_, inner)| inner);
+    let begins = std::iter::once(0).chain(inner.iter().copied()).collect();
     placed(&Sums::of(series), begins, together, series.len())
 }
 
