@@ -50,6 +50,9 @@ pub struct Args {
     /// Four times a day the noise is up to four times as loud, for half an hour to two and a half: only the deviations say so.
     #[arg(long, conflicts_with = "dump")]
     storms: bool,
+    /// Noise with a memory is averaged over the windows, as what the samples have is; the SNR does not know of it.
+    #[arg(long, conflicts_with = "dump")]
+    averaged: bool,
     /// Every recording is a dump of the payload recorder, from an instrument of its own; only accelerations are concealed in it.
     #[arg(long)]
     dump: bool,
@@ -121,14 +124,14 @@ fn concealed(args: &Args, engine: &Engine) -> anyhow::Result<Option<Vec<Outcome>
         (true, Some(id)) if effect::IDS.contains(&id) => vec![Kind::One],
         (true, Some(_)) => vec![Kind::Unknown],
     };
-    let Args { hours, other_physics, bursts, storms, dump, .. } = *args;
+    let Args { hours, other_physics, bursts, storms, averaged, dump, .. } = *args;
     let wander = match (args.smooth, args.flicker, args.resonant) {
         (true, _, _) => Wander::Smooth,
         (_, true, _) => Wander::Flicker,
         (_, _, true) => Wander::Resonant,
         _ => Wander::Autoregression,
     };
-    let manner = Manner { hours, other_physics, wander, bursts, storms, dump };
+    let manner = Manner { hours, other_physics, wander, bursts, storms, averaged, dump };
     let orders = run::plan(args.cases, args.seed, &kinds, manner, only);
     let progress = bar(orders.len(), "sealing");
     let seals = run::seal(&orders, &progress);

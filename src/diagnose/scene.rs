@@ -215,6 +215,7 @@ impl<'a> Scene<'a> {
         let [dev_ng, residuals_ng] =
             [&case.recording.dev_ng, &scene.residual_ng].map(|axes| axes.each_ref().map(|x| &x[..]));
         (scene.loudness, scene.contradicted) = noise::settled(dev_ng, &asleep(case), residuals_ng, &scene.schedule);
+        scene.schedule.slow_seen = noise::slow_part_seen(residuals_ng, &scene.schedule, scene.loudness.each_ref());
         scene
     }
 
@@ -224,7 +225,9 @@ impl<'a> Scene<'a> {
         let asleep = asleep(self.case);
         let loudness =
             self.loudness.each_ref().map(|known| known.gone_on(known.awake(&asleep), case.recording.clock_s.len()));
-        Scene { contradicted: self.contradicted, ..Scene::as_loud(case, surroundings, loudness) }
+        let mut scene = Scene { contradicted: self.contradicted, ..Scene::as_loud(case, surroundings, loudness) };
+        scene.schedule.slow_seen = self.schedule.slow_seen;
+        scene
     }
 
     fn as_loud(case: &'a Case, surroundings: Arc<Surroundings>, loudness: [Loudness; 3]) -> Self {

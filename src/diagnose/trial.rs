@@ -180,7 +180,8 @@ impl<'a> Trial<'a> {
     fn part(&self, index: Vec<usize>) -> Part {
         let shared = self.scene.schedule.shared_ng.each_ref();
         let shared = shared.map(|axis| axis.iter().map(|series| pick(series, &index)).collect());
-        let schedule = Schedule::new(&pick(self.scene.clock_s(), &index)).with_shared(shared);
+        let mut schedule = Schedule::new(&pick(self.scene.clock_s(), &index)).with_shared(shared);
+        schedule.slow_seen = self.scene.schedule.slow_seen;
         let sub = |axes: &Axes| -> Axes { std::array::from_fn(|k| pick(&axes[k], &index)) };
         let loudness = self.scene.loudness.each_ref().map(|axis| axis.pick(&index));
         let frame = Frame::new(self.noise, &schedule, &loudness, &sub(&self.scene.residual_ng));

@@ -111,6 +111,8 @@ pub struct Manner {
     pub bursts: bool,
     /// Hours in which the noise is louder, which no log has: only the deviations.
     pub storms: bool,
+    /// Noise with a memory is averaged over the windows, as what the samples have is; the SNR takes it at their middle.
+    pub averaged: bool,
     /// The recording is a dump of the payload recorder: the simulator's instrument feels what the flight has, calibrates itself, and
     /// every calibration is to be worked out from what it sends.
     pub dump: bool,
@@ -125,6 +127,7 @@ impl Default for Manner {
             wander: Wander::Autoregression,
             bursts: false,
             storms: false,
+            averaged: false,
             dump: false,
         }
     }
@@ -289,6 +292,7 @@ impl Question {
         };
         suffix += if order.manner.bursts { "-bursts" } else { "" };
         suffix += if order.manner.storms { "-storms" } else { "" };
+        suffix += if order.manner.averaged { "-averaged" } else { "" };
         suffix += if order.manner.dump { "-dump" } else { "" };
         let id = format!("{}-{:06}{suffix}", order.kind.word(), order.seed);
         let lacks_bulge = self.parts.iter().any(|(id, _, _)| id == "diurnal_bulge");

@@ -30,6 +30,8 @@ pub struct Noise {
     pub wander: Wander,
     /// Whether one half window in a hundred is ten times as loud.
     pub bursts: bool,
+    /// Whether windows have the mean of what has a memory, and not its value at their middle.
+    pub averaged: bool,
     /// Louder hours.
     pub storms: Vec<Storm>,
 }
@@ -74,6 +76,7 @@ impl Noise {
             slow_s: log_between(rng, 300.0, 10_800.0),
             wander: manner.wander,
             bursts: manner.bursts,
+            averaged: manner.averaged,
             storms: Vec::new(),
         };
         if manner.storms {
@@ -105,13 +108,19 @@ impl Noise {
         let mut slow = Slow::new(rng, self);
         let mut series = Vec::with_capacity(activity.len());
         let mut level_before = self.level_ng(axis, activity.first().copied().unwrap_or(1.0));
+        let mut half_before =
+            self.averaged.then(|| [level_before * red * red_now, self.slow_ng[axis] * slow.next(rng)]);
         for now in activity {
             let is_burst = self.bursts && between(rng, 0.0, 1.0) < BURSTS[0];
             let half = normal(rng) * if is_burst { BURSTS[1] } else { 1.0 };
             red_now = red_keep * red_now + (1.0 - red_keep * red_keep).sqrt() * normal(rng);
             let level = self.level_ng(axis, *now);
-            let quick = white * (level * half + level_before * before) / 2f64.sqrt() + level * red * red_now;
-            series.push(quick + self.slow_ng[axis] * slow.next(rng));
+            let white = white * (level * half + level_before * before) / 2f64.sqrt();
+            let half_now = [level * red * red_now, self.slow_ng[axis] * slow.next(rng)];
+            // The former half of a window is the latter of the one before.
+            let with_memory = half_before.map_or(half_now, |former| [0, 1].map(|i| 0.5 * (former[i] + half_now[i])));
+            half_before = half_before.map(|_| half_now);
+            series.push(white + with_memory[0] + with_memory[1]);
             (before, level_before) = (half, level);
         }
         series
@@ -341,6 +350,24 @@ mod tests {
             assert!(c.abs() < 6.0 / n.sqrt() + 0.01, "lag {lag}: {c}");
         }
     }
+    /// An alternating sum of windows that are means of halves is that of the first and the last half; one of other noise grows.
+    #[test]
+    fn what_is_averaged_over_windows_has_nothing_at_a_period_of_two_strides() {
+        let alternating = |averaged: bool| {
+            let mut rng = ChaCha12Rng::seed_from_u64(3);
+            let drawn = Noise::draw(&mut rng, true, Manner { averaged, ..Manner::default() });
+            let noise = Noise { awake_ng: [60.0; 3], slow_ng: [30.0; 3], slow_s: 300.0, ..drawn };
+            let series = noise.series(&mut rng, 0, &[1.0; 40_000]);
+            series.chunks(2).map(|pair| pair[1] - pair[0]).sum::<f64>().abs()
+        };
+        assert!(
+            alternating(true) < 400.0 && alternating(false) > 400.0,
+            "{} {}",
+            alternating(true),
+            alternating(false)
+        );
+    }
+
     #[test]
     fn smooth_slow_noise_has_the_size_and_the_memory_that_are_said() {
         let mut rng = ChaCha12Rng::seed_from_u64(2);

@@ -1,12 +1,16 @@
 //! The Kalman filter: its gains, window by window, and what it remembers of a series. Three states, and two more where there is a
 //! resonance; several noises or series side by side, since every step needs the one before.
+//!
+//! Where a window sees the mean of the slow part (see [`SlowSeen`]), the state of that is its value in the latter half of the window,
+//! and the window sees the mean of it and of the value in the former half, which is the latter half of the window before where both
+//! overlap.
 
-use super::{AxisNoise, Resonance, Schedule};
+use super::{AxisNoise, Resonance, Schedule, SlowSeen};
 
 /// Gains of whitening filters side by side, one row a window; with `R` resonances, none or one, each of two states.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row<const L: usize, const R: usize> {
-    h: [[f64; L]; 2],
+    h: [[f64; L]; 3],
     pub(super) per_sd: [f64; L],
     gain: [[f64; L]; 3],
     decay: [[f64; L]; 2],
@@ -26,8 +30,37 @@ pub(super) struct Riccati<'a, const L: usize, const R: usize> {
     with_resonance: [[[[f64; L]; 2]; 3]; R],
     of_resonance: [[[f64; L]; 3]; R],
     decay: [[f64; L]; 2],
+    slow: [Halves; L],
     transition: [[[[f64; L]; 2]; 2]; R],
     step_before: f64,
+}
+
+/// How the slow part comes to a window, from its value in the latter half of the window before; both halves are one where a window sees
+/// the slow part at its middle.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Halves {
+    /// What the window sees of the latter half as foretold.
+    seen: f64,
+    /// Variance of what is new in the latter half, of what is new in what the window sees, and their covariance; of a variance of one.
+    new: f64,
+    new_seen: f64,
+    of_both: f64,
+}
+
+impl Halves {
+    /// Of an autoregression of this correlation time after a step.
+    fn new(step_s: f64, tau_s: f64, seen: SlowSeen) -> Self {
+        let between = seen.between_halves_s(step_s);
+        let [to_former, to_latter] = [step_s - between, between].map(|s| (-s / tau_s).exp());
+        let mean = 0.5 * (1.0 + to_latter);
+        let [in_former, in_latter] = [to_former, to_latter].map(|kept| 1.0 - kept * kept);
+        Self {
+            seen: mean / to_latter,
+            new: to_latter * to_latter * in_former + in_latter,
+            new_seen: mean * mean * in_former + 0.25 * in_latter,
+            of_both: to_latter * mean * in_former + 0.5 * in_latter,
+        }
+    }
 }
 
 impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
@@ -45,6 +78,7 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
             with_resonance: [[[none; 2]; 3]; R],
             of_resonance: resonance.map(|of| [of.map(|r| r.rms_ng.powi(2)), none, of.map(|r| r.rms_ng.powi(2))]),
             decay: [none; 2],
+            slow: [Halves::default(); L],
             transition: [[[none; 2]; 2]; R],
             step_before: f64::NAN,
         }
@@ -57,6 +91,7 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
         let step = self.schedule.step_s[i];
         if step != self.step_before {
             self.decay = self.tau_s.map(|tau| tau.map(|tau| (-step / tau).exp()));
+            self.slow = self.tau_s[1].map(|tau| Halves::new(step, tau, self.schedule.slow_seen));
             self.transition = self.resonance.map(|of| {
                 let all = of.map(|r| r.transition(step));
                 std::array::from_fn(|i| std::array::from_fn(|j| all.map(|transition| transition[i][j])))
@@ -64,7 +99,7 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
             self.step_before = step;
         }
         let mut row = Row {
-            h: [[0.0; L]; 2],
+            h: [[0.0; L]; 3],
             per_sd: [0.0; L],
             gain: [[0.0; L]; 3],
             decay: self.decay,
@@ -80,10 +115,11 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
             let (p00, p01, p02) = (self.p[0][l], self.p[1][l] * f1, self.p[2][l] * f2);
             let p11 = f1 * f1 * (self.p[3][l] - v1) + v1;
             let p12 = self.p[4][l] * f1 * f2;
-            let p22 = f2 * f2 * (self.p[5][l] - v2) + v2;
-            let (h0, h1) = (previous, s[l]);
+            let p22 = f2 * f2 * self.p[5][l];
+            let slow = self.slow[l];
+            let (h0, h1, h2) = (previous, s[l], slow.seen);
             let [mut c0, mut c1, mut c2] =
-                [h0 * p00 + h1 * p01 + p02, h0 * p01 + h1 * p11 + p12, h0 * p02 + h1 * p12 + p22];
+                [h0 * p00 + h1 * p01 + h2 * p02, h0 * p01 + h1 * p11 + h2 * p12, h0 * p02 + h1 * p12 + h2 * p22];
             let ce = own * vw;
             // Covariances of what is seen with each resonance.
             let mut cr = [[0.0; 2]; R];
@@ -92,15 +128,17 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
                 self.step_resonance(r, l);
                 let (with, of) = (&self.with_resonance[r], &self.of_resonance[r]);
                 let hr = self.resonance[r][l].loudness(s[l]);
-                cr[r] =
-                    std::array::from_fn(|j| h0 * with[0][j][l] + h1 * with[1][j][l] + with[2][j][l] + hr * of[j][l]);
+                cr[r] = std::array::from_fn(|j| {
+                    h0 * with[0][j][l] + h1 * with[1][j][l] + h2 * with[2][j][l] + hr * of[j][l]
+                });
                 c0 += hr * with[0][0][l];
                 c1 += hr * with[1][0][l];
                 c2 += hr * with[2][0][l];
                 seen += hr * cr[r][0];
                 row.resonance_h[r][l] = hr;
             }
-            variance[l] = h0 * c0 + h1 * c1 + c2 + seen + own * ce;
+            variance[l] = h0 * c0 + h1 * c1 + h2 * c2 + v2 * slow.new_seen + seen + own * ce;
+            c2 += v2 * slow.of_both;
             let inverse = 1.0 / variance[l];
             let gain = [ce * inverse, c1 * inverse, c2 * inverse];
             self.p[0][l] = vw - ce * gain[0];
@@ -108,7 +146,7 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
             self.p[2][l] = -ce * gain[2];
             self.p[3][l] = p11 - c1 * gain[1];
             self.p[4][l] = p12 - c1 * gain[2];
-            self.p[5][l] = p22 - c2 * gain[2];
+            self.p[5][l] = p22 + v2 * slow.new - c2 * gain[2];
             for r in 0..R {
                 let [a, b] = cr[r].map(|c| c * inverse);
                 let (with, of) = (&mut self.with_resonance[r], &mut self.of_resonance[r]);
@@ -122,7 +160,7 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
                 of[1][l] -= cr[r][0] * b;
                 of[2][l] -= cr[r][1] * b;
             }
-            (row.h[0][l], row.h[1][l], row.per_sd[l]) = (h0, h1, inverse.sqrt());
+            (row.h[0][l], row.h[1][l], row.h[2][l], row.per_sd[l]) = (h0, h1, h2, inverse.sqrt());
             (row.gain[0][l], row.gain[1][l], row.gain[2][l]) = (gain[0], gain[1], gain[2]);
         }
         (row, variance)
@@ -201,7 +239,7 @@ impl<const L: usize, const R: usize> Memory<L, R> {
         for l in 0..L {
             let f = of(l);
             let (one, two) = (z1[l] * row.decay[0][f], z2[l] * row.decay[1][f]);
-            let mut innovation = x[l] - row.h[0][f] * z0[l] - row.h[1][f] * one - two;
+            let mut innovation = x[l] - row.h[0][f] * z0[l] - row.h[1][f] * one - row.h[2][f] * two;
             for ((states, [a, b]), h) in resonances.iter_mut().zip(&row.transition).zip(&row.resonance_h) {
                 let [x, v] = [states[0][l], states[1][l]];
                 states[0][l] = a[0][f] * x + a[1][f] * v;

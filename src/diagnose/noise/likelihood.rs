@@ -141,7 +141,7 @@ fn products_with<const L: usize, const R: usize>(
 #[cfg(test)]
 mod tests {
     use super::super::filter::tests::{NOISE, record};
-    use super::super::{Resonance, Stretch, Whitener};
+    use super::super::{Resonance, SlowSeen, Stretch, Whitener};
     use super::*;
 
     #[test]
@@ -192,9 +192,13 @@ mod tests {
     /// Every part written out as a covariance, a resonance as that of a driven damped oscillator: likelihood, whitening, and three filters side by side.
     #[test]
     fn the_filter_is_that_of_the_covariance_with_a_resonance_and_without() {
+        [SlowSeen::AtMiddle, SlowSeen::Mean].into_iter().for_each(compare_with_covariance);
+    }
+
+    fn compare_with_covariance(slow_seen: SlowSeen) {
         let resonance = Resonance { rms_ng: 40.0, period_s: 330.0, tau_s: 410.0, follows_crew: false };
         let clock: Vec<f64> = (0..60).filter(|i| i % 17 > 2).map(|i| 25.0 * f64::from(i)).collect();
-        let schedule = Schedule::new(&clock);
+        let schedule = Schedule { slow_seen, ..Schedule::new(&clock) };
         let n = clock.len();
         let loudness = Loudness::even((0..n).map(|i| 0.6 + 0.01 * i as f64).collect());
         let data: Vec<f64> = (0..n).map(|i| 100.0 * (i as f64 * 1.3).sin() + 3.0 * i as f64).collect();
@@ -214,7 +218,11 @@ mod tests {
             let covariance = DMatrix::from_fn(n, n, |i, j| {
                 let apart = (clock[i] - clock[j]).abs();
                 let short = NOISE.short_ng.powi(2) * (-apart / NOISE.short_tau_s).exp();
-                let slow = NOISE.slow_ng.powi(2) * (-apart / NOISE.slow_tau_s).exp();
+                // Of the mean of two halves with that of two others.
+                let kept = |apart_s: f64| (-apart_s.abs() / NOISE.slow_tau_s).exp();
+                let between = schedule.slow_seen.between_halves_s(25.0);
+                let of_halves = 0.25 * (2.0 * kept(apart) + kept(apart - between) + kept(apart + between));
+                let slow = NOISE.slow_ng.powi(2) * of_halves;
                 let oscillating = noise.resonance.map_or(0.0, |r| {
                     let damped = std::f64::consts::TAU / r.period_s;
                     let oscillation = (damped * apart).cos() + (damped * apart).sin() / (damped * r.tau_s);

@@ -6,6 +6,9 @@
 //! for it; one of the second order, a resonance, is beside them where an information criterion asks for it (see `order`). State space,
 //! so that gaps are simply longer steps. Samples out of the ordinary have a variance of their own (see [`Loudness`]).
 //!
+//! Windows may see the slow part at their middle or as a mean (see [`SlowSeen`]): that decides what they have at a period of two strides, where
+//! white noise of overlapping windows has nothing, and so what of the slow part can be believed.
+//!
 //! The amplitude of the slow part is estimated on a logarithmic scale with a prior: it never reaches zero, and a
 //! record too short to exclude slow noise is treated as having some. That is what keeps false leaks away. A hypothesis is weighed
 //! with its slow part marginalised, and with the possibility that it is no autoregression but flicker noise (see `flicker`).
@@ -37,6 +40,7 @@ use likelihood::{Series, products};
 use multiversion::multiversion;
 
 use super::optimise::Simplex;
+use crate::math::shared_work;
 
 /// Noise of one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +67,26 @@ impl AxisNoise {
     }
 }
 
+/// How windows see the slow part of the noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SlowSeen {
+    /// As it is at their middle: what is slow has come to the windows, and not to the samples.
+    #[default]
+    AtMiddle,
+    /// As a mean, like everything that samples have: it takes away what is quickest in it, and all at a period of two strides.
+    Mean,
+}
+
+impl SlowSeen {
+    /// Between the halves of a window that it sees, s, after a step.
+    fn between_halves_s(self, step_s: f64) -> f64 {
+        match self {
+            Self::AtMiddle => 0.0,
+            Self::Mean => step_s.min(HALF_S),
+        }
+    }
+}
+
 /// When the windows are and how active the crew was: what the noise depends on beside its parameters.
 #[derive(Debug, Clone)]
 pub struct Schedule {
@@ -72,6 +96,8 @@ pub struct Schedule {
     pub step_s: Vec<f64>,
     /// Coefficients of the window's own and of the previous sample noise.
     overlap: Vec<[f64; 2]>,
+    /// How they see the slow part of the noise.
+    pub slow_seen: SlowSeen,
     /// Errors that all windows share, per axis: series whose sizes are independent and standard normal, ng.
     pub shared_ng: [Vec<Vec<f64>>; 3],
     /// What was measured of the bias beside the windows, per axis.
@@ -111,6 +137,8 @@ impl<'a> Stretch<'a> {
 
 /// Window length, s: two windows closer than this share samples.
 const WINDOW_S: f64 = 50.0;
+/// From the middle of its former half to that of its latter.
+const HALF_S: f64 = 0.5 * WINDOW_S;
 /// Most that a window shares with the one before: with more it would share with the second before as well, and no moving average of
 /// two has such a correlation.
 const SHARED_MAX: f64 = 0.5;
@@ -130,7 +158,14 @@ impl Schedule {
                 [own, previous]
             })
             .collect();
-        Self { clock_s: clock_s.to_vec(), step_s, overlap, shared_ng: Default::default(), flips: Default::default() }
+        Self {
+            clock_s: clock_s.to_vec(),
+            step_s,
+            overlap,
+            slow_seen: SlowSeen::default(),
+            shared_ng: Default::default(),
+            flips: Default::default(),
+        }
     }
 
     /// The same with errors that all windows share.
@@ -154,6 +189,11 @@ impl Schedule {
         self.clock_s.is_empty()
     }
 }
+
+/// Log likelihood by which a mean must be the likelier way to see the slow part.
+const BY_MUCH: f64 = 10.0;
+/// Evaluations of the fits that are compared.
+const EVALUATIONS: usize = 110;
 
 /// Amplitude at which the prior of the slow part turns down, ng.
 const SLOW_PRIOR_NG: f64 = 10.0;
@@ -261,6 +301,17 @@ fn fit_and_likelihoods(
     evaluate(best.each_ref().map(|p| &p[..]))
 }
 
+/// How the windows of three axes see the slow part of their noise: as a mean where that makes it likelier by more than [`BY_MUCH`].
+pub fn slow_part_seen(residual_ng: [&[f64]; 3], schedule: &Schedule, loudness: [&Loudness; 3]) -> SlowSeen {
+    let likelihood = |slow_seen: SlowSeen| -> f64 {
+        let schedule = Schedule { slow_seen, ..schedule.clone() };
+        let shared = schedule.shared_ng.each_ref().map(|errors| &errors[..]);
+        fit_and_likelihoods(residual_ng, shared, &schedule, loudness, None, EVALUATIONS).iter().map(|(_, l)| l).sum()
+    };
+    let (at_middle, mean) = shared_work::both(|| likelihood(SlowSeen::AtMiddle), || likelihood(SlowSeen::Mean));
+    if mean > at_middle + BY_MUCH { SlowSeen::Mean } else { SlowSeen::AtMiddle }
+}
+
 /// The numbers of a noise that are fitted: logarithms of the short part's share of the white noise and of its time, s, and of the slow
 /// part's.
 fn logarithms(noise: &AxisNoise) -> [f64; 4] {
@@ -343,9 +394,16 @@ pub fn simulate(
     (0..schedule.len())
         .map(|i| {
             let step = schedule.step_s[i];
-            let [f1, f2] = [(-step / noise.short_tau_s).exp(), (-step / noise.slow_tau_s).exp()];
+            let f1 = (-step / noise.short_tau_s).exp();
             short = f1 * short + (1.0 - f1 * f1).sqrt() * noise.short_ng * normal();
-            slow = f2 * slow + (1.0 - f2 * f2).sqrt() * noise.slow_ng * normal();
+            let between = schedule.slow_seen.between_halves_s(step);
+            let mut to_half = |after_s: f64| {
+                let kept = (-after_s / noise.slow_tau_s).exp();
+                slow = kept * slow + (1.0 - kept * kept).sqrt() * noise.slow_ng * normal();
+                slow
+            };
+            let former = to_half(step - between);
+            let slow = if between > 0.0 { 0.5 * (former + to_half(between)) } else { former };
             let oscillating = resonance.as_mut().map_or(0.0, |(r, state)| {
                 *state = r.next(*state, step, [normal(), normal()]);
                 r.loudness(loudness.activity[i]) * state[0]
@@ -379,10 +437,27 @@ mod tests {
         Schedule::new(&clock)
     }
 
+    /// Slow noise of ten minutes, a third as loud as the windows, in which nothing else has a memory.
+    #[test]
+    fn slow_noise_of_the_samples_is_seen_as_a_mean_and_that_of_the_windows_at_their_middle() {
+        let noise = AxisNoise { white_ng: 60.0, short_ng: 2.0, slow_ng: 20.0, slow_tau_s: 570.0, ..NOISE };
+        let with_short = AxisNoise { short_ng: 14.0, short_tau_s: 75.0, ..noise };
+        let loudness = Loudness::even(vec![1.0; gappy().len()]);
+        for (seed, noise, slow_seen) in
+            [(1, noise, SlowSeen::Mean), (2, noise, SlowSeen::AtMiddle), (3, with_short, SlowSeen::AtMiddle)]
+        {
+            let schedule = Schedule { slow_seen, ..gappy() };
+            let mut normal = normals(seed);
+            let axes: [Vec<f64>; 3] = std::array::from_fn(|_| simulate(&noise, &schedule, &loudness, &mut normal));
+            let found = slow_part_seen(axes.each_ref().map(|x| &x[..]), &gappy(), [&loudness; 3]);
+            assert_eq!(found, slow_seen, "{seed}");
+        }
+    }
+
     #[test]
     fn what_the_filter_leaves_of_its_own_noise_is_white_and_of_unit_size_across_gaps_levels_and_bursts() {
         let noise = NOISE;
-        let schedule = gappy();
+        let schedule = Schedule { slow_seen: SlowSeen::Mean, ..gappy() };
         let mut loudness = Loudness::even((0..schedule.len()).map(|i| if i > 1500 { 0.6 } else { 1.2 }).collect());
         loudness.burst.iter_mut().step_by(40).for_each(|burst| *burst = 30.0);
         let x = simulate(&noise, &schedule, &loudness, normals(3));
