@@ -301,7 +301,7 @@ fn fit_and_likelihoods(
     evaluate(best.each_ref().map(|p| &p[..]))
 }
 
-/// How the windows of three axes see the slow part of their noise: as a mean where that makes it likelier by more than [`BY_MUCH`].
+/// How the windows of three axes see the slow part of their noise: as a mean where that makes it likelier by more than ten log units.
 pub fn slow_part_seen(residual_ng: [&[f64]; 3], schedule: &Schedule, loudness: [&Loudness; 3]) -> SlowSeen {
     let likelihood = |slow_seen: SlowSeen| -> f64 {
         let schedule = Schedule { slow_seen, ..schedule.clone() };
