@@ -1,4 +1,5 @@
-//! How many autoregressions the noise has, chosen on what the best hypothesis leaves, and the search again where they are more.
+//! How windows see the slow part of the noise and how many autoregressions it has, chosen on what the best hypothesis leaves, and the
+//! search again where that is not as it was.
 //!
 //! A hypothesis that leaves the noise louder about some period than the filter of two autoregressions expects may have missed a line, or
 //! the noise resonates there. A resonance is taken where, at the price of a criterion, all that is said with it is likelier than all that
@@ -22,7 +23,7 @@ pub fn solve_at_its_order(
     noise_null: [AxisNoise; 3],
     stop: Stop,
 ) -> Option<Solution> {
-    let plain = solve_beside_bursts(scene, library, noise_null, stop)?;
+    let plain = solve_as_seen(scene, library, noise_null, stop)?;
     let best = plain.best();
     let about_s = remains::loud_about_s(&best.left(scene, &library.entries), &scene.schedule, noise::PERIODS_S);
     if about_s.iter().all(Option::is_none) {
@@ -35,6 +36,20 @@ pub fn solve_at_its_order(
     let resonant = solve_unless(scene, library, null_noise(scene, Some(&noise_resonant)), stop)?;
     let likelier = height(scene, library, &resonant) - price > height(scene, library, &plain) + MARGIN;
     Some(if likelier { resonant } else { plain })
+}
+
+/// Searches and weighs as [`solve_beside_bursts`], the slow part seen as what the best hypothesis leaves has it: an effect that is still
+/// there looks like slow noise without anything quick.
+fn solve_as_seen(scene: &mut Scene, library: &Library, noise_null: [AxisNoise; 3], stop: Stop) -> Option<Solution> {
+    let solution = solve_beside_bursts(scene, library, noise_null, stop)?;
+    let left = solution.best().left(scene, &library.entries).residual_ng;
+    let left = left.each_ref().map(|x| &x[..]);
+    let seen = noise::slow_part_seen(left, &scene.schedule, scene.loudness.each_ref());
+    if seen == scene.schedule.slow_seen {
+        return Some(solution);
+    }
+    scene.schedule.slow_seen = seen;
+    solve_beside_bursts(scene, library, null_noise(scene, None), stop)
 }
 
 /// Log posterior of the best hypothesis and of what it leaves.

@@ -215,7 +215,6 @@ impl<'a> Scene<'a> {
         let [dev_ng, residuals_ng] =
             [&case.recording.dev_ng, &scene.residual_ng].map(|axes| axes.each_ref().map(|x| &x[..]));
         (scene.loudness, scene.contradicted) = noise::settled(dev_ng, &asleep(case), residuals_ng, &scene.schedule);
-        scene.schedule.slow_seen = noise::slow_part_seen(residuals_ng, &scene.schedule, scene.loudness.each_ref());
         scene
     }
 

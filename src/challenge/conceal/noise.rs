@@ -350,6 +350,7 @@ mod tests {
             assert!(c.abs() < 6.0 / n.sqrt() + 0.01, "lag {lag}: {c}");
         }
     }
+
     /// An alternating sum of windows that are means of halves is that of the first and the last half; one of other noise grows.
     #[test]
     fn what_is_averaged_over_windows_has_nothing_at_a_period_of_two_strides() {

@@ -15,6 +15,7 @@
 
 mod binned;
 mod filter;
+mod fit;
 mod flicker;
 mod flips;
 mod kalman;
@@ -24,9 +25,11 @@ mod loudness;
 mod marginal;
 mod order;
 mod resonance;
+mod seen;
 
 pub use binned::{BIN_S, Binned};
 pub use filter::Whitener;
+pub use fit::{fit, log_prior_but_slow};
 pub use flicker::where_it_may_be_flicker;
 pub use flips::{Flip, Flips};
 pub use levels::{Contradicted, settled};
@@ -34,13 +37,11 @@ pub use loudness::Loudness;
 pub use marginal::{SlowPart, slow_part_marginalised};
 pub use order::{FORGOTTEN_S, PERIODS_S, with_resonances};
 pub use resonance::Resonance;
+pub use seen::{SlowSeen, slow_part_seen};
 
-use likelihood::{Series, products};
+use fit::{EVALUATIONS, fit_and_likelihoods};
 
 use multiversion::multiversion;
-
-use super::optimise::Simplex;
-use crate::math::shared_work;
 
 /// Noise of one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,26 +65,6 @@ impl AxisNoise {
     pub fn rms_ng(&self) -> f64 {
         let resonance_ng = self.resonance.map_or(0.0, |r| r.rms_ng);
         (self.white_ng.powi(2) + self.short_ng.powi(2) + self.slow_ng.powi(2) + resonance_ng.powi(2)).sqrt()
-    }
-}
-
-/// How windows see the slow part of the noise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SlowSeen {
-    /// As it is at their middle: what is slow has come to the windows, and not to the samples.
-    #[default]
-    AtMiddle,
-    /// As a mean, like everything that samples have: it takes away what is quickest in it, and all at a period of two strides.
-    Mean,
-}
-
-impl SlowSeen {
-    /// Between the halves of a window that it sees, s, after a step.
-    fn between_halves_s(self, step_s: f64) -> f64 {
-        match self {
-            Self::AtMiddle => 0.0,
-            Self::Mean => step_s.min(HALF_S),
-        }
     }
 }
 
@@ -137,8 +118,6 @@ impl<'a> Stretch<'a> {
 
 /// Window length, s: two windows closer than this share samples.
 const WINDOW_S: f64 = 50.0;
-/// From the middle of its former half to that of its latter.
-const HALF_S: f64 = 0.5 * WINDOW_S;
 /// Most that a window shares with the one before: with more it would share with the second before as well, and no moving average of
 /// two has such a correlation.
 const SHARED_MAX: f64 = 0.5;
@@ -189,182 +168,6 @@ impl Schedule {
         self.clock_s.is_empty()
     }
 }
-
-/// Log likelihood by which a mean must be the likelier way to see the slow part.
-const BY_MUCH: f64 = 10.0;
-/// Evaluations of the fits that are compared.
-const EVALUATIONS: usize = 110;
-
-/// Amplitude at which the prior of the slow part turns down, ng.
-const SLOW_PRIOR_NG: f64 = 10.0;
-/// Longest and shortest correlation time of the slow part, s.
-const SLOW_TAU_S: [f64; 2] = [300.0, 10_800.0];
-
-/// Log prior of the noise (densities in the logarithms of its parameters).
-fn log_prior(noise: &AxisNoise) -> f64 {
-    let slow = noise.slow_ng / SLOW_PRIOR_NG;
-    let tau = noise.slow_tau_s.ln();
-    let wall = |x: f64| if x > 0.0 { 0.0 } else { -0.5 * (x / 0.15).powi(2) };
-    log_prior_but_slow(noise)
-        + (slow / (1.0 + slow * slow)).ln()
-        + wall(tau - SLOW_TAU_S[0].ln())
-        + wall(SLOW_TAU_S[1].ln() - tau)
-}
-
-/// The same without that of the slow part.
-pub fn log_prior_but_slow(noise: &AxisNoise) -> f64 {
-    let lognormal = |x: f64, centre: f64, width: f64| -0.5 * ((x / centre).ln() / width).powi(2);
-    lognormal(noise.short_ng / noise.white_ng, 0.2, 0.6) + lognormal(noise.short_tau_s, 100.0, 0.6)
-}
-
-/// The axes in the lanes of a register: the first goes along twice, which is faster than a lane left empty.
-const AXIS_OF_LANE: [usize; 4] = [0, 1, 2, 0];
-
-/// Fit the noise of the axes side by side, each to its residual, in which a constant and `shared_ng` are nuisance; from `start`
-/// if there is one.
-pub fn fit(
-    residual_ng: [&[f64]; 3],
-    shared_ng: [&[Vec<f64>]; 3],
-    schedule: &Schedule,
-    loudness: [&Loudness; 3],
-    start: Option<[&AxisNoise; 3]>,
-    evaluations: usize,
-) -> [AxisNoise; 3] {
-    fit_and_likelihoods(residual_ng, shared_ng, schedule, loudness, start, evaluations).map(|(noise, _)| noise)
-}
-
-/// The same, each with the log likelihood of its noise, the prior of that included.
-fn fit_and_likelihoods(
-    residual_ng: [&[f64]; 3],
-    shared_ng: [&[Vec<f64>]; 3],
-    schedule: &Schedule,
-    loudness: [&Loudness; 3],
-    start: Option<[&AxisNoise; 3]>,
-    evaluations: usize,
-) -> [(AxisNoise, f64); 3] {
-    let n = schedule.len() as f64;
-    let rms_ng = residual_ng.map(|residual| {
-        let mean = residual.iter().sum::<f64>() / n;
-        (residual.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt().max(1e-6)
-    });
-    // A resonance stays as it began, beside the white noise.
-    let beside = |k: usize| start.and_then(|start| Some((start[k].resonance?, start[k].white_ng)));
-    let noise_of = |k: usize, p: &[f64], scale_ng: f64| AxisNoise {
-        resonance: beside(k).map(|(r, white_ng)| Resonance { rms_ng: r.rms_ng * scale_ng / white_ng, ..r }),
-        ..from_logarithms(p, scale_ng)
-    };
-    let series = AXIS_OF_LANE.map(|k| Series { data: residual_ng[k], shared: shared_ng[k] });
-    let loudness = AXIS_OF_LANE.map(|k| loudness[k]);
-    // The overall scale is profiled: one rescaling step is exact up to the prior of the slow amplitude.
-    let evaluate = |points: [&[f64]; 3]| {
-        let unit = AXIS_OF_LANE.map(|k| noise_of(k, points[k], rms_ng[k]));
-        let found = products(&unit, schedule, loudness, series);
-        std::array::from_fn::<(AxisNoise, f64), 3, _>(|k| {
-            let scale2 = found[k].likeliest_scale2();
-            let noise = noise_of(k, points[k], rms_ng[k] * (0.5 * scale2.ln()).exp());
-            (noise, found[k].log_likelihood(scale2) + log_prior(&noise))
-        })
-    };
-    let width = if start.is_some() { [0.25, 0.25, 0.4, 0.4] } else { [0.5, 0.5, 0.8, 0.8] };
-    let usual = match start {
-        Some(_) => [BEGINS[0]; 3],
-        None => {
-            let values = BEGINS.map(|begin| evaluate([&begin; 3]).map(|(_, value)| value));
-            std::array::from_fn(|k| {
-                let best = (0..BEGINS.len()).max_by(|a, b| values[*a][k].total_cmp(&values[*b][k])).unwrap_or(0);
-                BEGINS[if values[best][k] > values[0][k] + FAR_BETTER { best } else { 0 }]
-            })
-        }
-    };
-    let mut simplexes = std::array::from_fn::<Simplex, 3, _>(|k| {
-        let begin = start.map_or(usual[k], |start| logarithms(start[k]));
-        Simplex::new(&begin, &width, evaluations)
-    });
-    loop {
-        for simplex in &mut simplexes {
-            while simplex.asks().is_some_and(is_outside) {
-                simplex.hears(f64::INFINITY);
-            }
-        }
-        if simplexes.iter().all(|simplex| simplex.asks().is_none()) {
-            break;
-        }
-        // A simplex that is done goes along at the middle of its bounds.
-        let values = evaluate(simplexes.each_ref().map(|simplex| simplex.asks().unwrap_or(&MIDDLE)));
-        for (simplex, (_, value)) in simplexes.iter_mut().zip(values) {
-            if simplex.asks().is_some() {
-                simplex.hears(-value);
-            }
-        }
-    }
-    let best = simplexes.map(Simplex::best);
-    evaluate(best.each_ref().map(|p| &p[..]))
-}
-
-/// How the windows of three axes see the slow part of their noise: as a mean where that makes it likelier by more than ten log units.
-pub fn slow_part_seen(residual_ng: [&[f64]; 3], schedule: &Schedule, loudness: [&Loudness; 3]) -> SlowSeen {
-    let likelihood = |slow_seen: SlowSeen| -> f64 {
-        let schedule = Schedule { slow_seen, ..schedule.clone() };
-        let shared = schedule.shared_ng.each_ref().map(|errors| &errors[..]);
-        fit_and_likelihoods(residual_ng, shared, &schedule, loudness, None, EVALUATIONS).iter().map(|(_, l)| l).sum()
-    };
-    let (at_middle, mean) = shared_work::both(|| likelihood(SlowSeen::AtMiddle), || likelihood(SlowSeen::Mean));
-    if mean > at_middle + BY_MUCH { SlowSeen::Mean } else { SlowSeen::AtMiddle }
-}
-
-/// The numbers of a noise that are fitted: logarithms of the short part's share of the white noise and of its time, s, and of the slow
-/// part's.
-fn logarithms(noise: &AxisNoise) -> [f64; 4] {
-    [
-        (noise.short_ng / noise.white_ng).ln(),
-        noise.short_tau_s.ln(),
-        (noise.slow_ng / noise.white_ng).ln(),
-        noise.slow_tau_s.ln(),
-    ]
-}
-
-/// The noise of such numbers and of so much white noise.
-fn from_logarithms(p: &[f64], white_ng: f64) -> AxisNoise {
-    AxisNoise {
-        white_ng,
-        short_ng: white_ng * p[0].exp(),
-        short_tau_s: p[1].exp(),
-        slow_ng: white_ng * p[2].exp(),
-        slow_tau_s: p[3].exp(),
-        resonance: None,
-    }
-}
-
-/// Whether such numbers are beyond their bounds.
-fn is_outside(p: &[f64]) -> bool {
-    p.iter().zip(BOUNDS).any(|(x, [low, high])| *x < low || *x > high)
-}
-
-/// Where a fit begins: the logarithms of 0.2, 100 s, 0.1 and 3000 s; and, where the noise is one with a memory and hardly white at
-/// all, with as much of the short part and four and ten
-/// times as much, of 25 s, 70 s and 200 s; and, where it is all but slow, with four and sixteen times as much of that, of 1000 s and
-/// 6000 s.
-const BEGINS: [[f64; 4]; 13] = [
-    [-1.609_437_912_434_100_3, 4.605_170_185_988_092, -2.302_585_092_994_045_5, 8.006_367_567_650_246],
-    [0.0, 3.2, -2.30, 8.01],
-    [0.0, 4.25, -2.30, 8.01],
-    [0.0, 5.3, -2.30, 8.01],
-    [1.4, 3.2, -2.30, 8.01],
-    [1.4, 4.25, -2.30, 8.01],
-    [1.4, 5.3, -2.30, 8.01],
-    [2.3, 4.25, -2.30, 8.01],
-    [2.3, 5.3, -2.30, 8.01],
-    [-1.61, 4.61, 1.4, 6.9],
-    [-1.61, 4.61, 1.4, 8.7],
-    [-1.61, 4.61, 2.8, 6.9],
-    [-1.61, 4.61, 2.8, 8.7],
-];
-/// Log likelihood by which another beginning must be better than the usual one.
-const FAR_BETTER: f64 = 20.0;
-
-/// Bounds of a fit.
-const BOUNDS: [[f64; 2]; 4] = [[-6.0, 3.0], [2.0, 7.0], [-9.0, 4.0], [5.0, 10.5]];
-const MIDDLE: [f64; 4] = [-2.0, 4.5, -2.5, 7.5];
 
 /// Dot product.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl+avx+avx2", "x86_64+avx+avx2"))]
@@ -418,12 +221,12 @@ pub fn simulate(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::filter::tests::NOISE;
     use super::*;
 
     /// A cheap source of nearly normal numbers: twelve uniform ones (a linear congruence, Knuth's MMIX constants).
-    fn normals(seed: u64) -> impl FnMut() -> f64 {
+    pub(super) fn normals(seed: u64) -> impl FnMut() -> f64 {
         let mut state = seed;
         let mut uniform = move || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -432,26 +235,9 @@ mod tests {
         move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
     }
 
-    fn gappy() -> Schedule {
+    pub(super) fn gappy() -> Schedule {
         let clock: Vec<f64> = (0..4000).filter(|i| i % 190 > 3).map(|i| 25.0 * f64::from(i)).collect();
         Schedule::new(&clock)
-    }
-
-    /// Slow noise of ten minutes, a third as loud as the windows, in which nothing else has a memory.
-    #[test]
-    fn slow_noise_of_the_samples_is_seen_as_a_mean_and_that_of_the_windows_at_their_middle() {
-        let noise = AxisNoise { white_ng: 60.0, short_ng: 2.0, slow_ng: 20.0, slow_tau_s: 570.0, ..NOISE };
-        let with_short = AxisNoise { short_ng: 14.0, short_tau_s: 75.0, ..noise };
-        let loudness = Loudness::even(vec![1.0; gappy().len()]);
-        for (seed, noise, slow_seen) in
-            [(1, noise, SlowSeen::Mean), (2, noise, SlowSeen::AtMiddle), (3, with_short, SlowSeen::AtMiddle)]
-        {
-            let schedule = Schedule { slow_seen, ..gappy() };
-            let mut normal = normals(seed);
-            let axes: [Vec<f64>; 3] = std::array::from_fn(|_| simulate(&noise, &schedule, &loudness, &mut normal));
-            let found = slow_part_seen(axes.each_ref().map(|x| &x[..]), &gappy(), [&loudness; 3]);
-            assert_eq!(found, slow_seen, "{seed}");
-        }
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! The order of the quick noise: one autoregression of the first order beside the white samples, or one of the second, a resonance,
 //! beside both, where a criterion asks for it.
 
+use super::fit::{BOUNDS, from_logarithms, is_outside, log_prior, logarithms};
 use super::likelihood::{Series, products};
-use super::{AxisNoise, BOUNDS, Loudness, Resonance, Schedule, from_logarithms, is_outside, log_prior, logarithms};
+use super::{AxisNoise, Loudness, Resonance, Schedule};
 use crate::diagnose::optimise::nelder_mead;
 use crate::math::shared_work;
 

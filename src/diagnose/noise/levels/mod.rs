@@ -9,12 +9,10 @@ mod crew;
 mod deviations;
 mod half_hours;
 
-use super::{Loudness, Schedule, fit_and_likelihoods};
+use super::{EVALUATIONS, Loudness, Schedule, fit_and_likelihoods};
 
 /// Fewest windows asleep, awake, or of half an hour, for a level of their own.
 const FEWEST: usize = 30;
-/// Evaluations of the fits that are compared.
-const EVALUATIONS: usize = 110;
 /// Longest step that counts: windows further apart differ by more than the quick noise.
 const STEP_MAX_S: f64 = 60.0;
 /// Relative standard error of a median of the magnitudes of n normal numbers, times the root of n; of n bends half are counted as
