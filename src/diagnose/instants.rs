@@ -11,9 +11,6 @@ const ROUNDING_RAD_S2: f64 = 1e-7;
 const STILL_S: f64 = 1800.0;
 /// What begins so near to the start or end of a change of attitude, s, may be of it.
 const TURN_S: f64 = 120.0;
-/// Most instants that are looked at as one series of them: what happens oftener happens all the time.
-const OFTEN: usize = 64;
-
 /// What happens over and over, in words, and when.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recurring {
@@ -90,7 +87,7 @@ pub fn recurring(s: &Scene) -> Vec<Recurring> {
     let mut add = |what: String, mut at_s: Vec<f64>| {
         at_s.retain(|t| (start..end).contains(t));
         at_s.sort_by(f64::total_cmp);
-        if (2..=OFTEN).contains(&at_s.len()) {
+        if at_s.len() > 1 {
             found.push(Recurring { what, at_s });
         }
     };

@@ -39,6 +39,9 @@ impl TrimLaw {
     }
 }
 
+/// Standard deviation of a normal distribution over its median absolute deviation.
+pub const MAD_TO_SIGMA: f64 = 1.4826;
+
 /// Points that a fraction of `points` stands for: floor of the product + 1e-9, so that an exact product is not lost.
 pub fn points_of_fraction(fraction: f64, points: usize) -> usize {
     (fraction * points as f64 + 1e-9).floor() as usize

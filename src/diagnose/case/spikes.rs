@@ -1,12 +1,10 @@
 //! Windows that stand alone, far out of what is before and after them: a value of another kind, and a single one would hide an axis.
 
 use super::{Recording, take};
-use crate::math::robust::median;
+use crate::math::robust::{MAD_TO_SIGMA, median};
 
 /// Standard deviations of the step from one window to the next beyond which a window that stands alone is a spike.
 pub const SPIKE: f64 = 30.0;
-/// Standard deviation over the median absolute one, of Gaussian noise.
-const NORMAL_OVER_MEDIAN: f64 = 1.4826;
 /// Windows on either side that a window is compared with, after the one that shares samples with it.
 const SIDE: usize = 3;
 
@@ -21,7 +19,7 @@ fn spikes(series: &[f64]) -> Vec<bool> {
     let mut steps: Vec<f64> = series.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
     // Counts so coarse that most windows have the same are no measure of the noise.
     let Some(step) = median(&mut steps).filter(|step| *step > 0.0) else { return vec![false; series.len()] };
-    let most = SPIKE * NORMAL_OVER_MEDIAN * step;
+    let most = SPIKE * MAD_TO_SIGMA * step;
     (0..series.len()).map(|i| away_from_both_sides(series, i) > most).collect()
 }
 

@@ -27,7 +27,8 @@ pub const EFFECT: Effect = Effect {
     signature: about,
     exact_at: Some(|wind_m_s| [wind_m_s[0], wind_m_s[1]]),
     assumes: None,
-    why: "The residual is what a steady wind along and across the track does to the drag, of a speed that the thermosphere has.",
+    why: "The residual is what a steady wind along and across the track (to port, along r x v) does to the drag, of a speed that the \
+          thermosphere has.",
 };
 
 /// Speed of the winds the search begins about, m/s, and their number, all round.

@@ -10,7 +10,7 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
 /// Scatter about the median: 1.4826 times the median absolute deviation.
 pub fn scatter(values: &[f64]) -> f64 {
     let centre = median(values.iter().copied());
-    1.4826 * median(values.iter().map(|v| (v - centre).abs()))
+    robust::MAD_TO_SIGMA * median(values.iter().map(|v| (v - centre).abs()))
 }
 
 /// How many samples of a series with memory carry as much as one independent sample: 1 + 2 sum rho_k, summed to the

@@ -171,6 +171,17 @@ impl Grid {
         })
     }
 
+    /// A series from the first window to the last.
+    pub fn real(&self, axis: usize) -> Vec<f64> {
+        self.series[axis][..=self.record as usize].iter().map(|x| x.re).collect()
+    }
+
+    /// 1 where there is a window, from the first to the last, and 0 elsewhere.
+    pub fn recorded(&self) -> Vec<f64> {
+        let is_there = |i: usize| self.series.iter().any(|s| s[i] != Complex64::ZERO);
+        (0..=self.record as usize).map(|i| f64::from(is_there(i))).collect()
+    }
+
     /// Places in all.
     pub fn length(&self) -> usize {
         self.series[0].len()

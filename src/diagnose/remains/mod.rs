@@ -1,9 +1,9 @@
 //! Whether structure remains when the best hypothesis has been taken away, even of a form that no dictionary has.
 //!
-//! Four questions to the whitened residual, which is white and independent from axis to axis where the hypothesis is whole:
+//! Six questions to the whitened residual, which is white and independent from axis to axis where the hypothesis is whole:
 //! do the axes move together in some band of periods (a push along one direction of the body at whatever instants does that),
-//! is there a line, of constant or of steadily drifting period, does something oscillate for a while, and does something ring after
-//! what recurs? And one to the residual itself: does it switch between two levels, where slow noise would wander? Not here: what it
+//! is there a line, of constant or of steadily drifting period, does something oscillate for a while, does something ring after
+//! what recurs, or come the same time after it, or at even distances of its own? And one to the residual itself: does it switch between two levels, where slow noise would wander? Not here: what it
 //! could be.
 //!
 //! Slow noise that is no autoregression is not white behind the filter of one: what is left is louder in some band than the noise
@@ -11,11 +11,13 @@
 
 mod band;
 mod chain;
+mod epochs;
 mod grid;
 mod line;
 mod parts;
 mod passing;
 mod ringing;
+mod stack;
 mod switching;
 mod together;
 
@@ -67,6 +69,8 @@ pub fn strongest(
         line::line(&grid, scale_ng),
         passing,
         ringing,
+        epochs::delayed(&grid, scale_ng, schedule.clock_s[0], recurring),
+        epochs::evenly(&grid, scale_ng, schedule.clock_s[0]),
         switching::switching(&binned, noise, schedule.clock_s[0]),
     ];
     let questions = asked.len() as f64;

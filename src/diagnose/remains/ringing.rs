@@ -20,6 +20,9 @@ use crate::math::shared_work;
 /// Power beside white noise, all axes together, from which on a line is weighed: one line of white noise in seventy has as much.
 const WORTH_WEIGHING: f64 = 8.0;
 
+/// Most instants after which something may ring: what happens oftener happens all the time.
+const OFTEN: usize = 64;
+
 /// What rings, in what time it dies away, s, and after what.
 type Ringing<'a> = (Oscillation, f64, &'a Recurring);
 
@@ -32,7 +35,8 @@ pub(super) fn ringing(
     recurring: &[Recurring],
 ) -> Option<Remains> {
     let of_each = shared_work::map(parts, |parts| {
-        let rings = recurring.iter().filter_map(|after| Rings::new(parts, first_s, after));
+        let seldom = recurring.iter().filter(|after| after.at_s.len() <= OFTEN);
+        let rings = seldom.filter_map(|after| Rings::new(parts, first_s, after));
         rings.map(|rings| rings.least_probable(noise)).collect::<Vec<(usize, Option<Ringing>)>>()
     });
     let trials: usize = of_each.iter().flatten().map(|(trials, _)| trials).sum();

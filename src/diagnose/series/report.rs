@@ -12,6 +12,7 @@ use crate::diagnose::measured::log_score::{gain, rises};
 use crate::diagnose::measured::spread::median;
 use crate::diagnose::measured::{Answer, MeasuredCase};
 use crate::math::rms::{rms, rms_about_mean};
+use crate::math::robust::MAD_TO_SIGMA;
 
 /// Evidence of an effect that is not claimed from which on it is told: odds of five hundred.
 const REFUSED_TOLD: f64 = 12.4;
@@ -390,5 +391,5 @@ fn located(measured: &[&Row<'_>]) -> Located {
 
 /// Scatter from one block to the next, free of everything slow.
 fn short_term(values: &[f64]) -> f64 {
-    1.4826 * median(values.windows(2).map(|w| (w[1] - w[0]).abs())) / 2f64.sqrt()
+    MAD_TO_SIGMA * median(values.windows(2).map(|w| (w[1] - w[0]).abs())) / 2f64.sqrt()
 }

@@ -69,8 +69,9 @@ const AGAIN_SHARE: f64 = 0.1;
 /// several times the usual towards it by a standard error; and bound only what the record cannot say at all.
 const TOLD: f64 = 3.0;
 
-/// Log evidence lost to noise that is not white, from which on it is told.
+/// Log evidence lost to noise that is not white, from which on it is told: so much, and such a share of all.
 const TOLD_OF_COLOUR: f64 = 1.0;
+const TOLD_SHARE_OF_COLOUR: f64 = 0.05;
 
 /// What proof there is, and what is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -139,7 +140,7 @@ fn of_the_mismatch(
     notes.extend(of_proportion(scene));
     notes.extend(of_the_simulation(scene));
     notes.extend(of_resonances(&solution.null));
-    notes.extend(of_colour(solution.statistic() - proof.statistic));
+    notes.extend(of_colour(solution.statistic(), proof.statistic));
     let (listed, refusals) = credible(scene, library, &solution.listed);
     notes.extend(refusals);
     let judged = judge(scene, library, solution, &listed, proof);
@@ -269,11 +270,12 @@ fn of_resonances(null: &Weighed) -> Vec<String> {
 }
 
 /// Says by how much evidence was lessened, where that may matter.
-fn of_colour(lessened: f64) -> Option<String> {
-    (lessened > TOLD_OF_COLOUR).then(|| {
+fn of_colour(statistic: f64, proven: f64) -> Option<String> {
+    let lessened = statistic - proven;
+    (lessened > TOLD_OF_COLOUR.max(TOLD_SHARE_OF_COLOUR * statistic)).then(|| {
         format!(
-            "what remains is louder than the noise fitted at the periods of the best hypothesis, or not white: {lessened:.1} of its log \
-             evidence is no proof"
+            "what remains is louder than the noise fitted at the periods of the best hypothesis, or not white: {lessened:.1} of its \
+             {statistic:.1} in log evidence (natural logarithm of odds) is no proof"
         )
     })
 }

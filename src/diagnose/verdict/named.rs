@@ -64,6 +64,24 @@ pub fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Bes
             delta_bic: 2.0 * (best.weighed.log_posterior - w.log_posterior),
         })
         .collect();
+    answer.notes.extend(of_larger_sets(best, library, listed));
+}
+
+/// Says what beside the named is likelier than not, and not sure enough to be named.
+fn of_larger_sets(best: &Best, library: &Library, listed: &[&Weighed]) -> Option<String> {
+    let named = ids(library, &best.set);
+    let larger = listed.iter().find(|w| w.set.members.len() > named.len() && is_nested(&w.set, &best.set))?;
+    let log_odds = larger.log_posterior - best.weighed.log_posterior;
+    let beside: Vec<String> = ids(library, &larger.set).into_iter().filter(|id| !named.contains(id)).collect();
+    (log_odds > 0.0 && !beside.is_empty()).then(|| {
+        format!(
+            "{} beside {} is likelier than not, at odds of {:.1}, and is not named below odds of {:.0}",
+            beside.join(" + "),
+            named.join(" + "),
+            log_odds.exp(),
+            EQUAL.exp()
+        )
+    })
 }
 
 /// What a set is made of, `None` where an open form is in it.

@@ -5,7 +5,7 @@
 //! all. What the trimmed mean would have been left with is the skew.
 
 use super::sequence::Hold;
-use crate::math::robust::{TrimLaw, median};
+use crate::math::robust::{MAD_TO_SIGMA, TrimLaw, median};
 use crate::math::shared_work::map;
 use crate::telemetry::Axis;
 use crate::units::Clock;
@@ -118,7 +118,7 @@ impl Position {
             let (s, _, level) = self.amplitude(tau_s);
             let residuals: Vec<f64> = self.seconds.iter().map(|(t, y)| y - level - s * (-t / tau_s).exp()).collect();
             let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
-            self.scatter = (1.4826 * median(&mut sizes).unwrap_or(1.0)).max(0.2);
+            self.scatter = (MAD_TO_SIGMA * median(&mut sizes).unwrap_or(1.0)).max(0.2);
             for (weight, residual) in self.weights.iter_mut().zip(&residuals) {
                 *weight = (HUBER * self.scatter / residual.abs().max(1e-9)).min(1.0);
             }
