@@ -30,10 +30,12 @@ pub const LAWS: [(&str, &str); 16] = [
 ];
 
 /// Laws that are there by name only: what is drawn stays what it was.
-const LAWS_BY_NAME: [(&str, &str); 3] = [
+const LAWS_BY_NAME: [(&str, &str); 5] = [
     ("unknown_ringing", "a damped oscillation after every change of attitude"),
     ("unknown_packet", "an oscillation that swells and fades once"),
     ("unknown_slow_chirp", "a slow oscillation of drifting period"),
+    ("unknown_delayed", "a push of minutes some time after every logged event"),
+    ("unknown_clock", "a ramp that starts again at even distances of its own"),
 ];
 
 /// Name and plain statement of every law.
@@ -91,6 +93,8 @@ pub fn signature(rng: &mut ChaCha12Rng, name: &str, flight: &Flight, total: &[Ve
         "unknown_slow_chirp" => along(chirp(rng, flight, [4000.0, 20_000.0]), fixed),
         "unknown_ringing" => along(ringing(rng, flight), fixed),
         "unknown_packet" => along(packet(rng, flight), fixed),
+        "unknown_delayed" => along(delayed(rng, flight), fixed),
+        "unknown_clock" => along(clock(rng, flight), fixed),
         "unknown_telegraph" => along(telegraph(rng, n), fixed),
         "unknown_density_temperature" => {
             let density = force::density(flight, force::WHOLE_AIR);
@@ -167,6 +171,28 @@ fn echo(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
         }
     }
     shape
+}
+
+/// As long as the event, and of a firing as long as a window sees.
+fn delayed(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
+    let delay = between(rng, 500.0, 6000.0);
+    let of = |kind: &str| flight.events.iter().filter(|e| e.kind == kind).collect::<Vec<_>>();
+    let kinds: Vec<_> = ["thruster", "evaporator", "water_dump"].map(of).into_iter().filter(|e| e.len() > 2).collect();
+    let mut shape = vec![0.0; flight.times_s.len()];
+    for event in pick(rng, &kinds) {
+        let from = event.clock_s + delay;
+        let until = from + event.duration_s.max(80.0);
+        for (x, _) in shape.iter_mut().zip(&flight.times_s).filter(|(_, t)| (from..until).contains(*t)) {
+            *x = 1.0;
+        }
+    }
+    shape
+}
+
+/// Four times in the record at least.
+fn clock(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
+    let (period, phase) = (log_between(rng, 3000.0, flight.length_s / 4.0), between(rng, 0.0, 1.0));
+    flight.times_s.iter().map(|t| ((t - flight.start_s) / period + phase).fract()).collect()
 }
 
 /// Its period at first between two, and shorter at last.

@@ -194,7 +194,7 @@ impl Linear {
             ))
         };
         if value.abs() > self.size_max {
-            return needs(self.size_max, "most");
+            return needs(self.size_max.copysign(value), if value > 0.0 { "most" } else { "least" });
         }
         if value + doubt < self.least {
             return needs(self.least, "least");

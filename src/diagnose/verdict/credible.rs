@@ -11,9 +11,9 @@ pub const EQUAL: f64 = 3.0;
 /// So many reasons of refusals are told.
 const REFUSALS_TOLD: usize = 3;
 
-/// Listed sets whose sizes can be believed, and why others are refused.
+/// Listed sets whose sizes can be believed, and why others are refused: an effect once, as it is in the best set that is refused for it.
 pub fn credible<'a>(scene: &Scene, library: &Library, sets: &'a [Weighed]) -> (Vec<&'a Weighed>, Vec<String>) {
-    let (mut kept, mut refusals) = (Vec::new(), Vec::new());
+    let (mut kept, mut refused): (Vec<&Weighed>, Vec<(&str, String)>) = (Vec::new(), Vec::new());
     for w in sets {
         let (frame, set) = w.framed(scene, &library.entries);
         let (mean, covariance) = set.coefficients(&frame, &library.entries);
@@ -24,18 +24,18 @@ pub fn credible<'a>(scene: &Scene, library: &Library, sets: &'a [Weighed]) -> (V
             for (k, l) in effect.linear.iter().enumerate().take(m.linear()) {
                 let doubt = 2.0 * covariance[(next + k, next + k)].max(0.0).sqrt();
                 if let Some(why) = l.refuses(mean[next + k], doubt) {
-                    reason = Some(format!("{} is refused: {why}", effect.id));
+                    reason = Some((effect.id, format!("{} is refused: {why}", effect.id)));
                 }
             }
             next += m.linear();
         }
         match reason {
             None => kept.push(w),
-            Some(reason) if !refusals.contains(&reason) && refusals.len() < REFUSALS_TOLD => refusals.push(reason),
-            Some(_) => {}
+            Some((id, _)) if refused.iter().any(|(told, _)| *told == id) => {}
+            Some(reason) => refused.push(reason),
         }
     }
-    (kept, refusals)
+    (kept, refused.into_iter().map(|(_, reason)| reason).take(REFUSALS_TOLD).collect())
 }
 
 /// The smallest set that is part of the best one and as good.
