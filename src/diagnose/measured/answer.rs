@@ -86,7 +86,7 @@ pub struct Level {
     pub rms: Vec<f64>,
     /// Of the whole vector.
     pub rms_total: f64,
-    /// 1 for a model that leaves noise only; of poses against the scatter of one reading, less than which their means should leave.
+    /// 1 for a model that leaves noise only; of poses against the error that their own readings say.
     pub whitened_chi2_per_dof: f64,
 }
 

@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 
 use super::arc::{Arc, ArcFit, Impulse, solve};
 use super::search::{Level, Problem, SCORE_MIN, UNLISTED_M_S2, covariance, independent, residual};
+use crate::physics::earth_orientation::lagrange_weights;
 
 /// Epochs at either end of an arc between which an instant is looked for.
 const EDGE_EPOCHS: usize = 4;
@@ -14,8 +15,10 @@ const EDGE_EPOCHS: usize = 4;
 const PROVISIONAL: f64 = 0.1;
 /// In any case what one arc has for itself must leave less than this part.
 pub(super) const LEFT_MAX: f64 = 0.2;
-/// A step is told from an unlisted push that lasts when it is this many times what such a push gains over the arc.
+/// A step is told from an unlisted push that lasts when it is this many times what such a push gains over the arc; or as much as it, where
+/// nothing is left beside the stated accuracy, so many times: a push that lasts is no step.
 const UNLISTED_TIMES: f64 = 10.0;
+const ACCURATE: f64 = 1.2;
 /// Unknowns of a velocity step.
 const UNKNOWNS: f64 = 4.0;
 
@@ -51,7 +54,9 @@ pub fn step(problem: &Problem, level: &Level, rivals: &[f64]) -> Option<Level> {
         }
         let Some(tried) = fitted(problem, level, i) else { continue };
         let is = tried.rms_m(0..arc.fitted);
-        let small = tried.impulse.is_none_or(|impulse| impulse.dv_m_s.norm() < least_m_s(arc));
+        let accurate = is <= ACCURATE * 3f64.sqrt() * problem.sigma_m;
+        let least_m_s = least_m_s(arc) / if accurate { UNLISTED_TIMES } else { 1.0 };
+        let small = tried.impulse.is_none_or(|impulse| impulse.dv_m_s.norm() < least_m_s);
         if small || is > LEFT_MAX * was {
             continue;
         }
@@ -113,7 +118,7 @@ fn fitted(problem: &Problem, level: &Level, i: usize) -> Option<ArcFit> {
     });
     let (k, step, left) = tried.min_by(|a, b| a.2.total_cmp(&b.2))?;
     // Linear columns see an orbit that is still bent to the step: only what is far from enough is turned away here.
-    if left > 0.25 * y.norm_squared() || step.norm() < 0.3 * least_m_s(arc) {
+    if left > 0.25 * y.norm_squared() || step.norm() < 0.3 * least_m_s(arc) / UNLISTED_TIMES {
         return None;
     }
     let mut from = fit.clone();
@@ -134,6 +139,19 @@ fn columns(arc: &Arc, fit: &ArcFit, k: usize) -> Option<DMatrix<f64>> {
     Some(columns)
 }
 
+/// Directions of the radius and of the orbit's normal at an instant, from the positions about it.
+fn radial_and_normal(t_s: &[f64], observed_m: &[Vector3<f64>], at_s: f64) -> [Vector3<f64>; 2] {
+    const NODES: usize = 8;
+    let n = t_s.len();
+    let after = t_s.partition_point(|t| *t < at_s).clamp(1, n - 1);
+    let first = after.saturating_sub(NODES / 2).min(n.saturating_sub(NODES));
+    let near = first..(first + NODES).min(n);
+    let nodes: Vec<f64> = t_s[near.clone()].iter().map(|t| t - at_s).collect();
+    let weights = lagrange_weights(&nodes, 0.0);
+    let position: Vector3<f64> = weights.iter().zip(&observed_m[near]).map(|(w, r)| r * *w).sum();
+    [position.normalize(), observed_m[after - 1].cross(&observed_m[after]).normalize()]
+}
+
 fn described(problem: &Problem, level: &Level, i: usize) -> Option<Manoeuvre> {
     let (arc, fit) = (&problem.arcs[i], &level.fits[i]);
     let impulse = fit.impulse?;
@@ -152,9 +170,7 @@ fn described(problem: &Problem, level: &Level, i: usize) -> Option<Manoeuvre> {
         }
         (impulse.dv_m_s.dot(direction), weights.dot(&(&covariance * &weights)).max(0.0).sqrt())
     };
-    let after = arc.t_s.partition_point(|t| *t < impulse.at_s).clamp(1, arc.t_s.len() - 1);
-    let radial = arc.observed_m[after].normalize();
-    let normal = radial.cross(&(arc.observed_m[after] - arc.observed_m[after - 1])).normalize();
+    let [radial, normal] = radial_and_normal(&arc.t_s, &arc.observed_m, impulse.at_s);
     let at = 6 + active + 3;
     Some(Manoeuvre {
         arc: i,
@@ -165,4 +181,23 @@ fn described(problem: &Problem, level: &Level, i: usize) -> Option<Manoeuvre> {
         score: score(arc, fit, rms_m),
         rms_m,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A satellite of the navigation systems moves an eighth of a radian between two of its positions.
+    #[test]
+    fn directions_are_those_of_the_instant_itself() {
+        let rate_rad_s = 1.4585e-4;
+        let at = |t: f64| 2.656e7 * Vector3::new((rate_rad_s * t).cos(), (rate_rad_s * t).sin(), 0.0);
+        let t_s: Vec<f64> = (0..60).map(|i| 900.0 * f64::from(i)).collect();
+        let observed_m: Vec<Vector3<f64>> = t_s.iter().map(|t| at(*t)).collect();
+        for at_s in [40_000.0, 40_500.0, 900.0, 52_700.0] {
+            let [radial, normal] = radial_and_normal(&t_s, &observed_m, at_s);
+            assert!((radial - at(at_s).normalize()).norm() < 1e-6, "{at_s}: {radial}");
+            assert!((normal - Vector3::z()).norm() < 1e-12, "{at_s}: {normal}");
+        }
+    }
 }

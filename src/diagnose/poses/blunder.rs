@@ -7,10 +7,13 @@
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::still::Pose;
-use super::{Part, SPARE_POSES, Triad, fit};
+use super::{Triad, fit, fullest};
 
 /// Of so many poses one may be a blunder.
 const SHARE: usize = 6;
+/// Share beyond which those found are no blunders but what the model lacks, and how many always may be.
+const SHARE_OUT: usize = 10;
+const ALWAYS: usize = 2;
 /// Probability with which a triad without blunders loses a pose.
 const CHANCE: f64 = 1e-3;
 
@@ -23,14 +26,32 @@ pub struct Blunder {
     pub off_m_s2: f64,
 }
 
-/// The poses without blunders, in order, and those.
-pub fn without_blunders(poses: Vec<Pose>, gravity: f64) -> (Vec<Pose>, Vec<Blunder>) {
+/// Poses that are far off all others beside the fullest model.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FarOff {
+    /// Blunders, which are left out.
+    Blunders(Vec<Blunder>),
+    /// So many that it is what the model lacks: none of them is left out.
+    TooMany(Vec<Blunder>),
+}
+
+impl FarOff {
+    /// Those that are left out.
+    pub fn left_out(&self) -> &[Blunder] {
+        if let Self::Blunders(out) = self { out } else { &[] }
+    }
+}
+
+/// The poses without blunders, in order, and what is far off.
+pub fn without_blunders(poses: Vec<Pose>, gravity: f64) -> (Vec<Pose>, FarOff) {
+    let (kept, out) = far_off(&poses, gravity);
+    let too_many = out.len() > ALWAYS.max(poses.len() / SHARE_OUT);
+    if too_many { (poses, FarOff::TooMany(out)) } else { (kept, FarOff::Blunders(out)) }
+}
+
+fn far_off(poses: &[Pose], gravity: f64) -> (Vec<Pose>, Vec<Blunder>) {
     let most = poses.len() / SHARE;
-    let unknowns = |parts: &[Part]| 1 + parts.iter().map(|p| p.unknowns()).sum::<usize>();
-    let carried = |parts: &&[Part]| poses.len() >= most + unknowns(parts) + SPARE_POSES;
-    let Some(parts) = (0..=Part::ALL.len()).rev().map(|n| &Part::ALL[..n]).find(carried) else {
-        return (poses, Vec::new());
-    };
+    let Some(parts) = fullest(poses.len().saturating_sub(most)) else { return (poses.to_vec(), Vec::new()) };
     let mut kept: Vec<usize> = (0..poses.len()).collect();
     let mut taken: Vec<usize> = Vec::new();
     let mut blunders = 0;

@@ -3,10 +3,15 @@
 //!
 //! a = s T K (u - u0 - b), K = diag(1 + k), T upper triangular with the three small angles: positive where two sensing axes make less
 //! than a right one. The common scale s is a nuisance.
+//!
+//! Readings err, and not the magnitude: what a model leaves is |a| - g over its slope by the readings, the distance of a reading from
+//! where the model has the size of gravity (Sampson 1982). Without that, poses about one direction are best explained by a zero far off and a
+//! scale near nothing, which makes every error small.
 
 pub mod blunder;
 mod report;
 pub mod still;
+mod structure;
 #[cfg(test)]
 mod tests;
 
@@ -92,10 +97,16 @@ pub struct Triad {
     pub parts: Vec<Part>,
     /// Metres per second squared and count.
     pub scale: f64,
+    /// The same if the triad were ideal.
+    usual_scale: f64,
     unknowns: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// |a| - g for every pose fitted, m/s^2.
+    /// How far every pose fitted is from gravity's size, at the usual scale, m/s^2: |a| - g where the triad is nearly ideal.
     pub residuals: Vec<f64>,
+    /// |a| - g of every pose fitted, m/s^2.
+    pub misfits: Vec<f64>,
+    /// Derivatives of the residuals by the unknowns.
+    slopes: DMatrix<f64>,
     /// Share of its own misfit that every pose takes by being fitted.
     leverages: Vec<f64>,
 }
@@ -103,12 +114,12 @@ pub struct Triad {
 impl Triad {
     /// Rms of |a| - g, m/s^2.
     pub fn rms(&self) -> f64 {
-        rms(&self.residuals)
+        rms(&self.misfits)
     }
 
     /// Rms of what the fit of another model changes, m/s^2.
     fn rms_from(&self, other: &Self) -> f64 {
-        rms(&self.residuals.iter().zip(&other.residuals).map(|(a, b)| a - b).collect::<Vec<f64>>())
+        rms(&self.misfits.iter().zip(&other.misfits).map(|(a, b)| a - b).collect::<Vec<f64>>())
     }
 
     /// Value and standard error of a part's three numbers.
@@ -132,6 +143,11 @@ impl Triad {
     /// |a| - g this model gives for other poses, m/s^2.
     pub fn predict(&self, poses: &[Pose], gravity: f64) -> Vec<f64> {
         poses.iter().map(|pose| acceleration(&self.parts, &self.unknowns, pose).norm() - gravity).collect()
+    }
+
+    /// Direction of gravity's reaction in the triad in a pose.
+    fn direction(&self, pose: &Pose) -> Vector3<f64> {
+        acceleration(&self.parts, &self.unknowns, pose).normalize()
     }
 }
 
@@ -167,16 +183,30 @@ fn acceleration(parts: &[Part], unknowns: &DVector<f64>, pose: &Pose) -> Vector3
     Vector3::new(a.x - angle.x * a.y - angle.y * a.z, a.y - angle.z * a.z, a.z)
 }
 
+/// How far a pose's reading is from where gravity has its size, at the usual scale, m/s^2.
+fn distance(parts: &[Part], unknowns: &DVector<f64>, pose: &Pose, [gravity, usual_scale]: [f64; 2]) -> f64 {
+    let scale = three(parts, unknowns, Part::Scale);
+    let angle = three(parts, unknowns, Part::NonOrthogonality);
+    let a = acceleration(parts, unknowns, pose);
+    let size = a.norm();
+    // Slopes of the size by the readings: those of the directions, by those of the axes.
+    let d = a / size;
+    let turned = Vector3::new(d.x, d.y - angle.x * d.x, d.z - angle.y * d.x - angle.z * d.y);
+    let slope = Vector3::from_fn(|k, _| turned[k] / (1.0 + scale[k])).norm() * unknowns[0].exp();
+    (size - gravity) * usual_scale / slope
+}
+
 struct Problem<'a> {
     parts: &'a [Part],
     poses: &'a [Pose],
     gravity: f64,
+    usual_scale: f64,
     unknowns: DVector<f64>,
 }
 
 impl Problem<'_> {
     fn at(&self, unknowns: &DVector<f64>) -> DVector<f64> {
-        let one = |pose: &Pose| acceleration(self.parts, unknowns, pose).norm() - self.gravity;
+        let one = |pose: &Pose| distance(self.parts, unknowns, pose, [self.gravity, self.usual_scale]);
         DVector::from_iterator(self.poses.len(), self.poses.iter().map(one))
     }
 
@@ -220,8 +250,9 @@ impl levenberg_marquardt::LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
 pub fn fit(parts: &[Part], poses: &[Pose], gravity: f64) -> Triad {
     let size: f64 = poses.iter().map(|p| p.mean.norm()).sum::<f64>() / poses.len() as f64;
     let mut unknowns = DVector::zeros(1 + parts.iter().map(|p| p.unknowns()).sum::<usize>());
-    unknowns[0] = (gravity / size).ln();
-    let start = Problem { parts, poses, gravity, unknowns };
+    let usual_scale = gravity / size;
+    unknowns[0] = usual_scale.ln();
+    let start = Problem { parts, poses, gravity, usual_scale, unknowns };
     let (solved, _) = levenberg_marquardt::LevenbergMarquardt::new().minimize(start);
     let residuals: Vec<f64> = solved.at(&solved.unknowns).iter().copied().collect();
     let slopes = solved.slopes();
@@ -231,14 +262,19 @@ pub fn fit(parts: &[Part], poses: &[Pose], gravity: f64) -> Triad {
     let inverse =
         slopes.tr_mul(&slopes).try_inverse().unwrap_or_else(|| DMatrix::from_diagonal_element(n, n, f64::MAX));
     let scale = solved.unknowns[0].exp();
+    let misfit = |pose: &Pose| acceleration(parts, &solved.unknowns, pose).norm() - gravity;
+    let misfits = poses.iter().map(misfit).collect();
     let leverages = slopes.row_iter().map(|row| (row * &inverse * row.transpose())[0]).collect();
     Triad {
         leverages,
         parts: parts.to_vec(),
         scale,
+        usual_scale,
         unknowns: solved.unknowns,
         covariance: inverse * variance,
         residuals,
+        misfits,
+        slopes,
     }
 }
 
@@ -250,6 +286,8 @@ pub struct Found {
     pub added: Vec<(Part, f64)>,
     /// Evidence of the strongest part refused.
     pub refused: f64,
+    /// Other sets that are as likely as what was found, but for odds of twenty.
+    pub rivals: Vec<Vec<Part>>,
 }
 
 /// Forward search from the parts the simulation has. A part may be needed only together with another (scale factors
@@ -263,7 +301,7 @@ pub fn search(included: &[Part], poses: &[Pose], gravity: f64) -> Found {
         let mut best: (f64, Vec<Part>) = (0.0, Vec::new());
         for set in subsets(&open) {
             let parts: Vec<Part> = now.parts.iter().chain(&set).copied().collect();
-            if poses.len() < 1 + parts.iter().map(|p| p.unknowns()).sum::<usize>() + SPARE_POSES {
+            if poses.len() < poses_needed(&parts) {
                 continue;
             }
             let score = evidence(now, &fit(&parts, poses, gravity), &set);
@@ -272,7 +310,8 @@ pub fn search(included: &[Part], poses: &[Pose], gravity: f64) -> Found {
             }
         }
         if best.0 < SCORE_MIN {
-            return Found { fits, added, refused: best.0 };
+            let named: Vec<Part> = added.iter().map(|(part, _)| *part).collect();
+            return Found { rivals: rivals(&fits, &named, poses, gravity), fits, added, refused: best.0 };
         }
         for part in best.1 {
             let mut parts = fits[fits.len() - 1].parts.clone();
@@ -281,6 +320,33 @@ pub fn search(included: &[Part], poses: &[Pose], gravity: f64) -> Found {
             fits.push(fit(&parts, poses, gravity));
         }
     }
+}
+
+/// Sets that are as likely as the named, none of them a part of the other.
+fn rivals(fits: &[Triad], named: &[Part], poses: &[Pose], gravity: f64) -> Vec<Vec<Part>> {
+    const EQUAL: f64 = 6.0;
+    let (bare, Some(last)) = (&fits[0], fits.last().filter(|_| !named.is_empty())) else { return Vec::new() };
+    let best = evidence(bare, last, named);
+    let within = |one: &[Part], other: &[Part]| one.iter().all(|part| other.contains(part));
+    let open: Vec<Part> = Part::ALL.into_iter().filter(|p| !bare.parts.contains(p)).collect();
+    let rival = |set: &Vec<Part>| {
+        let parts = [&bare.parts[..], set].concat();
+        !within(set, named)
+            && !within(named, set)
+            && poses.len() >= poses_needed(&parts)
+            && evidence(bare, &fit(&parts, poses, gravity), set) > best - EQUAL
+    };
+    subsets(&open).into_iter().filter(rival).collect()
+}
+
+/// The parts of the fullest model that so many poses can carry, `None` where they cannot carry the common scale.
+fn fullest(poses: usize) -> Option<&'static [Part]> {
+    (0..=Part::ALL.len()).rev().map(|n| &Part::ALL[..n]).find(|parts| poses >= poses_needed(parts))
+}
+
+/// How many poses a model asks for.
+fn poses_needed(parts: &[Part]) -> usize {
+    1 + parts.iter().map(|p| p.unknowns()).sum::<usize>() + SPARE_POSES
 }
 
 /// All choices of one or more parts, smaller ones first.
@@ -296,22 +362,24 @@ fn evidence(before: &Triad, after: &Triad, set: &[Part]) -> f64 {
     let k: usize = set.iter().map(|p| p.unknowns()).sum();
     // What is left of few poses after many unknowns is small by fitting alone: only the poses to spare count.
     let free = n - after.unknowns.len() as f64;
-    let fitted = (n / free).sqrt() * after.rms().max(1e-12);
-    let bare = (n / (free + k as f64)).sqrt() * before.rms();
+    let fitted = (n / free).sqrt() * rms(&after.residuals).max(1e-12);
+    let bare = (n / (free + k as f64)).sqrt() * rms(&before.residuals);
     2.0 * free * (bare / fitted).ln() - k as f64 * n.ln()
 }
 
 /// Analyse a case of static poses.
 pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
     let gravity = gravity(case)?;
-    let (poses, blunders) = without_blunders(poses(case, files)?, gravity);
+    let (poses, far_off) = without_blunders(poses(case, files)?, gravity);
     let found = search(&included(case)?, &poses, gravity);
+    let remains = fullest(poses.len()).and_then(|parts| structure::structure(&fit(parts, &poses, gravity), &poses));
     let added = std::iter::once("as it stands").chain(found.added.iter().map(|(part, _)| part.id()));
     let plate = PosesPlate {
         added: added.map(str::to_owned).collect(),
-        residuals: found.fits.iter().map(|fit| fit.residuals.clone()).collect(),
+        residuals: found.fits.iter().map(|fit| fit.misfits.clone()).collect(),
     };
-    Ok((report::answer(case, &poses, &blunders, gravity, &found), Plates::Poses(plate)))
+    let seen = report::Seen { poses: &poses, far_off: &far_off, gravity, found: &found, remains };
+    Ok((report::answer(case, &seen), Plates::Poses(plate)))
 }
 
 /// The size of gravity where the poses were held, m/s^2.

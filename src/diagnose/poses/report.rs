@@ -1,11 +1,12 @@
 //! What the poses were found to lack, in words and figures. Not here: how it was found.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::blunder::Blunder;
+use super::blunder::{Blunder, FarOff};
 use super::still::Pose;
-use super::{Found, Part, Triad, fit};
-use crate::diagnose::answer::{LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
+use super::structure::Structure;
+use super::{Found, Part, Triad, fit, poses_needed};
+use crate::diagnose::answer::{Covariate, Hypothesis, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::keys::texts;
 use crate::diagnose::measured::answer::{
     ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, in_order, parameter, posterior,
@@ -13,8 +14,25 @@ use crate::diagnose::measured::answer::{
 use crate::diagnose::measured::{Answer, MeasuredCase, log_score};
 use crate::math::rms::rms;
 
-/// Chance at or below which a scatter of the poses is called a mismatch.
+/// Chance at or below which what the poses follow is a mismatch, and a scatter is told.
 const CLAIM: f64 = 0.002;
+
+/// Poses that scatter by so many times what their readings say, and of which some are far off or too many parts are not asked, lack something.
+const FAR: f64 = 3.0;
+
+/// What was seen of the poses.
+pub struct Seen<'a> {
+    /// Those used.
+    pub poses: &'a [Pose],
+    /// What is far off.
+    pub far_off: &'a FarOff,
+    /// m/s^2.
+    pub gravity: f64,
+    /// Parts found.
+    pub found: &'a Found,
+    /// What the fullest model leaves follows.
+    pub remains: Option<Structure>,
+}
 
 /// Unit of the readings, by the names of their columns.
 fn unit(case: &MeasuredCase) -> String {
@@ -55,16 +73,26 @@ fn effect(case: &MeasuredCase, fit: &Triad, part: Part, score: f64, [was, is]: [
 }
 
 /// The answer.
-pub fn answer(case: &MeasuredCase, poses: &[Pose], blunders: &[Blunder], gravity: f64, found: &Found) -> Answer {
+pub fn answer(case: &MeasuredCase, seen: &Seen) -> Answer {
+    let &Seen { poses, far_off, gravity, found, .. } = seen;
     let (first, last) = (&found.fits[0], &found.fits[found.fits.len() - 1]);
-    // One reading's own scatter: poses that disagree by more than that hold something the model lacks.
-    let reading = poses.iter().map(|p| p.scatter).sum::<f64>() / poses.len() as f64 * last.scale;
-    let chance = chance(last, reading);
-    let verdict = match (found.added.is_empty(), last.rms() > reading && chance <= CLAIM) {
+    // What a pose's own readings say of its mean.
+    let floor = rms(&poses.iter().map(|p| p.error).collect::<Vec<f64>>()) * last.usual_scale;
+    let remains = seen.remains.as_ref().filter(|r| r.probability <= CLAIM);
+    let scatters = scatter_chance(last, poses, floor) <= CLAIM;
+    let far = scatters && rms(&last.residuals) > FAR * floor;
+    let few = found.added.is_empty() && poses.len() < poses_needed(&Part::ALL);
+    let cannot_tell = few || matches!(far_off, FarOff::TooMany(_));
+    let odd = remains.is_some() || (far && cannot_tell);
+    let verdict = match (found.added.is_empty(), odd) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::Consistent,
-        (false, false) => Verdict::Explained,
+        (false, false) if found.rivals.is_empty() => Verdict::Explained,
+        (false, false) => Verdict::Ambiguous,
     };
+    let ids = |parts: &[Part]| parts.iter().map(|part| part.id().to_owned()).collect::<Vec<String>>();
+    let named: Vec<Part> = found.added.iter().map(|(part, _)| *part).collect();
+    let sets = || std::iter::once(&named).chain(&found.rivals).map(|set| ids(set)).collect();
     let mut effects = Vec::new();
     for (i, (part, score)) in found.added.iter().enumerate() {
         let (before, with) = (&found.fits[i], &found.fits[i + 1]);
@@ -73,6 +101,8 @@ pub fn answer(case: &MeasuredCase, poses: &[Pose], blunders: &[Blunder], gravity
         effects.push(one);
     }
     let effects = in_order(effects);
+    // Where what is left follows something nothing is given a cause.
+    let (effects, fitted_beside) = if odd { (Vec::new(), effects) } else { (effects, Vec::new()) };
     let step = |(i, fit): (usize, &Triad)| StepAnswer {
         added: i.checked_sub(1).map(|i| found.added[i].0.id().to_owned()),
         rms: fit.rms(),
@@ -82,7 +112,7 @@ pub fn answer(case: &MeasuredCase, poses: &[Pose], blunders: &[Blunder], gravity
     let level = |fit: &Triad| Level {
         rms: vec![fit.rms()],
         rms_total: fit.rms(),
-        whitened_chi2_per_dof: (fit.rms() / reading).powi(2),
+        whitened_chi2_per_dof: (rms(&fit.residuals) / floor).powi(2),
     };
     let [before, after] = [first, last].map(|fit| missed(&fit.parts, poses, gravity));
     let score = log_score::rises(&before, &after).map(|rises| log_score::gain(&rises));
@@ -99,12 +129,12 @@ pub fn answer(case: &MeasuredCase, poses: &[Pose], blunders: &[Blunder], gravity
         id: "poses".to_owned(),
         verdict,
         effects: effects.clone(),
-        fitted_beside: Vec::new(),
+        fitted_beside,
         rms_before: first.rms(),
         rms_after: last.rms(),
         predicted_rms: Some(after),
         fitted: poses.len(),
-        masked: blunders.len(),
+        masked: far_off.left_out().len(),
         note: None,
     };
     Answer {
@@ -112,45 +142,101 @@ pub fn answer(case: &MeasuredCase, poses: &[Pose], blunders: &[Blunder], gravity
         case: case.id.clone(),
         verdict,
         false_alarm_probability: match verdict {
-            Verdict::Unexplained => chance,
+            Verdict::Unexplained => remains.map_or_else(|| scatter_chance(last, poses, floor), |r| r.probability),
             _ => (-0.5 * found.added.last().map_or(found.refused, |a| a.1)).exp(),
         }
         .clamp(LEAST_PROBABILITY, 1.0),
-        located: Located::default(),
+        located: if odd { located(remains, far_off) } else { Located::default() },
         effects,
         alternatives: Vec::new(),
-        hypothesis: None,
+        hypothesis: remains.map(|r| hypothesis(r, found)),
         unit: "m/s^2".to_owned(),
-        fit: Fit { noise_floor: vec![reading], before: level(first), after: level(last), held_out: Some(held) },
+        fit: Fit { noise_floor: vec![floor], before: level(first), after: level(last), held_out: Some(held) },
         upper_limits: Vec::new(),
         separating_observation: None,
-        cannot_tell_apart: Vec::new(),
+        cannot_tell_apart: if verdict == Verdict::Ambiguous { sets() } else { Vec::new() },
         arcs: vec![arc],
         steps: found.fits.iter().enumerate().map(step).collect(),
-        notes: notes(poses, blunders),
+        notes: notes(seen, (scatters && !odd).then(|| [rms(&last.residuals), floor])),
     }
 }
 
-fn notes(poses: &[Pose], blunders: &[Blunder]) -> Vec<String> {
-    let found = format!(
+/// Where what the poses follow is, and those that are far off.
+fn located(remains: Option<&Structure>, far_off: &FarOff) -> Located {
+    let follows =
+        |r: &Structure| Covariate { name: "direction of gravity in the triad, and time".into(), score: r.energy };
+    let mut intervals = Vec::new();
+    if let FarOff::TooMany(all) = far_off {
+        let off = |b: &Blunder| Interval { start_s: b.pose.start_s, end_s: b.pose.end_s, why: "a pose far off".into() };
+        intervals.extend(all.iter().map(off));
+    }
+    Located {
+        axes: remains.map_or(Vec::new(), |r| r.axes.iter().map(|axis| (*axis).to_owned()).collect()),
+        frame: "sensor".to_owned(),
+        covariates: remains.map(follows).into_iter().collect(),
+        intervals,
+        ..Located::default()
+    }
+}
+
+fn hypothesis(remains: &Structure, found: &Found) -> Hypothesis {
+    let beside: Vec<&str> = found.added.iter().map(|(part, _)| part.id()).collect();
+    let beside = if beside.is_empty() { String::new() } else { format!(" It remains beside {}.", beside.join(" + ")) };
+    Hypothesis {
+        formula: remains.formula.clone(),
+        axis: remains.axes.join(", "),
+        unit: "m/s^2".to_owned(),
+        location: format!(
+            "In |a| - g beside a zero, scales and angles of the axes; d is the direction of gravity's reaction in the triad, t goes from 0 at the \
+             first pose to 1 at the last{}.{beside}",
+            remains.from_s.map(|s| format!("; it begins at {s:.1} s")).unwrap_or_default()
+        ),
+    }
+}
+
+/// `scatter`, m/s^2: by how much poses scatter about the last fit, and what their readings say, where it is more and follows nothing.
+fn notes(seen: &Seen, scatter: Option<[f64; 2]>) -> Vec<String> {
+    let poses = seen.poses;
+    let mut notes = vec![format!(
         "{} static poses were found (a pose that was knocked and lay as before counts once); the common scale is estimated with every model.",
-        poses.len() + blunders.len()
-    );
-    let left_out = blunders.iter().map(|Blunder { pose, off_m_s2 }| {
+        poses.len() + seen.far_off.left_out().len()
+    )];
+    notes.extend(seen.far_off.left_out().iter().map(|Blunder { pose, off_m_s2 }| {
         format!(
             "The pose from {:.1} to {:.1} s is left out: its acceleration is off gravity by {off_m_s2:.4} m/s^2, which no model of the triad \
              that fits the others gives.",
             pose.start_s, pose.end_s
         )
-    });
-    std::iter::once(found).chain(left_out).collect()
+    }));
+    if let FarOff::TooMany(all) = seen.far_off {
+        notes.push(format!(
+            "{} of {} poses are far off what fits the others: too many for blunders, and none is left out.",
+            all.len(),
+            poses.len()
+        ));
+    }
+    let needed = poses_needed(&Part::ALL);
+    if poses.len() < needed {
+        notes.push(format!(
+            "{} poses cannot carry a zero, scales and angles together, for which {needed} are needed: what is not asked is not excluded.",
+            poses.len()
+        ));
+    }
+    if let Some([scatter, floor]) = scatter {
+        notes.push(format!(
+            "Poses scatter by {scatter:.5} m/s^2, and their own readings say {floor:.5}: what differs from pose to pose without following \
+             anything that was asked is taken as their error."
+        ));
+    }
+    notes
 }
 
-/// The chance that poses scatter as they do about a model if each is as well known as one of its readings.
-fn chance(fit: &Triad, reading: f64) -> f64 {
+/// The chance that poses scatter as they do about a model if each is as well known as its own readings say, which is estimated from as many
+/// numbers as there are axes of poses.
+fn scatter_chance(fit: &Triad, poses: &[Pose], floor: f64) -> f64 {
     let free = fit.residuals.len() as f64 - fit.unknowns.len() as f64;
-    let chi2: f64 = fit.residuals.iter().map(|r| (r / reading).powi(2)).sum();
-    ChiSquared::new(free).map_or(1.0, |law| law.sf(chi2))
+    let variance = fit.residuals.iter().map(|r| r * r).sum::<f64>() / free;
+    FisherSnedecor::new(free, 3.0 * poses.len() as f64).map_or(1.0, |law| law.sf(variance / floor.powi(2)))
 }
 
 /// By how much every pose is missed by what is fitted to half of them, the other half, m/s^2.

@@ -37,6 +37,8 @@ pub struct Pose {
     pub mean: Vector3<f64>,
     /// Scatter of one reading about the mean, one axis, counts.
     pub scatter: f64,
+    /// Error of the mean, one axis, counts: half of what its two halves differ by, which has what is slow as well.
+    pub error: f64,
 }
 
 /// Read columns of numbers separated by blanks or commas; `columns` names them: a time and three axes, such as
@@ -175,5 +177,8 @@ fn pose(rows: &[Row]) -> Pose {
     let n = rows.len() as f64;
     let mean = rows.iter().map(|r| r.counts).sum::<Vector3<f64>>() / n;
     let scatter = (rows.iter().map(|r| (r.counts - mean).norm_squared()).sum::<f64>() / (3.0 * n)).sqrt();
-    Pose { start_s: rows[0].t_s, end_s: rows[rows.len() - 1].t_s, mean, scatter }
+    let mean_of = |rows: &[Row]| rows.iter().map(|r| r.counts).sum::<Vector3<f64>>() / rows.len() as f64;
+    let (first, second) = rows.split_at(rows.len() / 2);
+    let error = (0.25 * (mean_of(first) - mean_of(second)).norm_squared() / 3.0).sqrt();
+    Pose { start_s: rows[0].t_s, end_s: rows[rows.len() - 1].t_s, mean, scatter, error }
 }

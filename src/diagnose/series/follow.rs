@@ -1,6 +1,8 @@
 //! What a sensor's series may follow beside its simulation, each as a column of the regression. Not here: which of them it
 //! follows (see `search`).
 
+use std::f64::consts::TAU;
+
 use super::form::Form;
 use super::read::{Axis, Series};
 use crate::diagnose::measure::relaxed;
@@ -27,6 +29,10 @@ pub enum Follows {
     Form(Form, usize, f64),
     /// Neither: the product of two covariates, each less its mean.
     Product(usize, usize),
+    /// Neither: a push from an instant on, for so long, both in s.
+    Pulse(f64, f64),
+    /// Neither: an oscillation with a period, s, and a phase at the first sample, rad.
+    Line(f64, f64),
 }
 
 impl Follows {
@@ -39,7 +45,7 @@ impl Follows {
             Self::Step(_) => "bias_step",
             Self::Scale => "scale_factor",
             Self::Offset(_) => "time_offset",
-            Self::Form(..) | Self::Product(..) => "formula",
+            Self::Form(..) | Self::Product(..) | Self::Pulse(..) | Self::Line(..) => "formula",
         }
     }
 
@@ -52,7 +58,7 @@ impl Follows {
             Self::Step(_) => "A step of the bias",
             Self::Scale => "A scale factor against the reference",
             Self::Offset(_) => "A clock ahead of the reference's",
-            Self::Form(..) | Self::Product(..) => "A formula",
+            Self::Form(..) | Self::Product(..) | Self::Pulse(..) | Self::Line(..) => "A formula",
         }
     }
 
@@ -62,6 +68,7 @@ impl Follows {
         match self {
             Self::Temperature(k, _) | Self::Delayed(k, _) | Self::Field(k) | Self::Form(_, k, _) => name(k),
             Self::Product(k, j) => format!("{} and {}", name(k), name(j)),
+            Self::Pulse(..) | Self::Line(..) => "time".to_owned(),
             other => other.id().to_owned(),
         }
     }
@@ -74,7 +81,7 @@ impl Follows {
             }
             Self::Form(form, k, _) => format!("{axis}/{}", form.unit(&series.covariates[*k].unit)),
             Self::Product(k, j) => format!("{axis}/({} {})", series.covariates[*k].unit, series.covariates[*j].unit),
-            Self::Drift(_) | Self::Step(_) => axis.to_owned(),
+            Self::Drift(_) | Self::Step(_) | Self::Pulse(..) | Self::Line(..) => axis.to_owned(),
             Self::Scale => "1".to_owned(),
             Self::Offset(_) => "s".to_owned(),
         }
@@ -84,6 +91,7 @@ impl Follows {
     pub fn price(&self) -> f64 {
         match self {
             Self::Temperature(_, 0.0) | Self::Form(.., 0.0) | Self::Product(..) | Self::Field(_) | Self::Scale => 1.0,
+            Self::Pulse(..) | Self::Line(..) => 3.0,
             _ => 2.0,
         }
     }
@@ -105,7 +113,7 @@ impl Follows {
             | Self::Step(s)
             | Self::Offset(s)
             | Self::Form(.., s) => Some(s),
-            Self::Scale | Self::Field(_) | Self::Product(..) => None,
+            Self::Scale | Self::Field(_) | Self::Product(..) | Self::Pulse(..) | Self::Line(..) => None,
         }
     }
 
@@ -127,7 +135,7 @@ impl Follows {
             Self::Drift(_) => Self::Drift(s),
             Self::Step(_) => Self::Step(s),
             Self::Offset(_) => Self::Offset(s),
-            Self::Scale | Self::Field(_) | Self::Product(..) => self,
+            Self::Scale | Self::Field(_) | Self::Product(..) | Self::Pulse(..) | Self::Line(..) => self,
         }
     }
 }
@@ -166,6 +174,12 @@ pub fn equation(series: &Series, axis: &Axis, model: &[Follows]) -> Equation {
         }
         Follows::Drift(tau_s) => t.iter().map(|t| (-(t - series.t_s[0]) / tau_s).exp()).collect(),
         Follows::Step(at_s) => t.iter().map(|t| f64::from(u8::from(t >= at_s))).collect(),
+        Follows::Pulse(from_s, length_s) => {
+            t.iter().map(|t| f64::from(u8::from((0.0..*length_s).contains(&(t - from_s))))).collect()
+        }
+        Follows::Line(period_s, phase) => {
+            t.iter().map(|t| (TAU * (t - series.t_s[0]) / period_s + phase).sin()).collect()
+        }
         Follows::Scale => reference.clone().unwrap_or_else(none),
         Follows::Offset(_) => reference.as_ref().map_or_else(none, |r| slope(t, r).iter().map(|s| -s).collect()),
     };

@@ -85,6 +85,8 @@ pub struct Series {
     pub axes: Vec<Axis>,
     /// Covariates.
     pub covariates: Vec<CovariateSeries>,
+    /// Covariates that could not be read in most rows: their names.
+    pub unread: Vec<String>,
     /// Rows that could not be read, and blunders.
     pub masked: usize,
 }
@@ -122,15 +124,31 @@ pub fn series(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<S
     let controls = columns(case, "recording.controls")?;
     let covariates = columns(case, "recording.covariates")?;
     let references: Vec<Column> = values.iter().filter_map(Column::its_reference).collect();
-    let all: Vec<&Column> = values.iter().chain(&controls).chain(&covariates).chain(&references).collect();
-    let (t_s, table, masked) = rows(case, &file, &files[&file], &all)?;
+    let needed = values.len() + controls.len();
+    let all: Vec<&Column> = values.iter().chain(&controls).chain(&references).chain(&covariates).collect();
+    let (t_s, mut table, masked) = rows(case, &file, &files[&file], &all, needed + references.len())?;
+    // What nobody can read is followed by nothing that could be shown.
+    let readable = |column: &Vec<f64>| 2 * column.iter().filter(|v| v.is_finite()).count() >= column.len();
+    let mut of_covariates = table.split_off(needed + references.len());
+    let is_read: Vec<bool> = of_covariates.iter().map(readable).collect();
+    let names = |wanted: bool| {
+        let some = covariates.iter().zip(&is_read).filter(move |(_, is_read)| **is_read == wanted);
+        some.map(|(column, _)| column.name.clone()).collect::<Vec<String>>()
+    };
+    let (read, unread) = (names(true), names(false));
+    let covariates: Vec<Column> = covariates.into_iter().filter(|column| read.contains(&column.name)).collect();
+    let mut is_read = is_read.into_iter();
+    of_covariates.retain(|_| is_read.next().unwrap_or(false));
+    let mut of_references = table.split_off(needed);
+    table.append(&mut of_covariates);
+    table.append(&mut of_references);
     let spans = spans(case)?;
     let count = if references.is_empty() { BLOCKS } else { BLOCKS_WITH_REFERENCE };
     let Blocks { t_s, span, mut table, masked: blunders } = blocks(&t_s, &table, &spans, count);
     if t_s.len() < BLOCKS_MIN {
         return Err(MeasuredError::TooFew { what: "blocks of rows", found: t_s.len(), expected: BLOCKS_MIN });
     }
-    let mut references = table.split_off(all.len() - references.len()).into_iter();
+    let mut references = table.split_off(needed + covariates.len()).into_iter();
     let mut table = table.into_iter();
     let mut axis = |column: Column, control: bool| {
         let mut values = table.next().unwrap_or_default();
@@ -150,7 +168,7 @@ pub fn series(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<S
     let mut used: Vec<usize> = span.clone();
     used.dedup();
     let span: Vec<usize> = span.iter().map(|s| used.binary_search(s).unwrap_or(0)).collect();
-    Ok(Series { t_s, span, spans: used.len(), axes, covariates, masked: masked + blunders })
+    Ok(Series { t_s, span, spans: used.len(), axes, covariates, unread, masked: masked + blunders })
 }
 
 impl Column {
@@ -189,8 +207,9 @@ fn spans(case: &MeasuredCase) -> Result<Vec<[f64; 2]>, MeasuredError> {
 
 type Rows = (Vec<f64>, Vec<Vec<f64>>, usize);
 
-/// Time in seconds after the first row, and the wanted columns; rows with a hole are left out and counted.
-fn rows(case: &MeasuredCase, file: &str, text: &str, wanted: &[&Column]) -> Result<Rows, MeasuredError> {
+/// Time in seconds after the first row, and the wanted columns, of which the first are `needed`. A cell that is no number has none; rows
+/// without a time, or without any number that is needed, are left out and counted.
+fn rows(case: &MeasuredCase, file: &str, text: &str, wanted: &[&Column], needed: usize) -> Result<Rows, MeasuredError> {
     let time = case.text("recording.time.column")?;
     let format = lookup(&case.table, "recording.time.format").and_then(|v| v.as_str());
     let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).from_reader(text.as_bytes());
@@ -209,41 +228,46 @@ fn rows(case: &MeasuredCase, file: &str, text: &str, wanted: &[&Column]) -> Resu
     let places: Vec<usize> = wanted.iter().map(|c| place(&c.name)).collect::<Result<_, _>>()?;
     let (mut t_s, mut table, mut masked) = (Vec::new(), vec![Vec::new(); wanted.len()], 0);
     let mut first = None;
-    let mut unread: Option<(usize, String, String)> = None;
+    // The first of the times, and of each column, that is none.
+    let mut unread: Vec<Option<(usize, String, String)>> = vec![None; wanted.len() + 1];
     for record in reader.records() {
         let Ok(record) = record else {
             masked += 1;
             continue;
         };
         let stamp = record.get(time_at).and_then(|s| seconds(s, format));
-        let row: Option<Vec<f64>> =
-            places.iter().map(|k| record.get(*k)?.parse::<f64>().ok().filter(|v| v.is_finite())).collect();
-        match (stamp, row) {
-            (Some(stamp), Some(row)) => {
+        let number = |k: &usize| record.get(*k)?.parse::<f64>().ok().filter(|v| v.is_finite());
+        let row: Vec<Option<f64>> = places.iter().map(number).collect();
+        let line = record.position().map_or(0, |p| p.line() as usize);
+        let field = |k: usize| record.get(k).unwrap_or_default().to_owned();
+        if stamp.is_none() {
+            let form = format.map_or("a time".to_owned(), |format| format!("a time as {format}"));
+            unread[0].get_or_insert((line, format!("{form} in column {time}"), field(time_at)));
+        }
+        for (k, column) in wanted.iter().enumerate().filter(|(k, _)| row[*k].is_none()) {
+            unread[k + 1].get_or_insert((line, format!("a number in column {}", column.name), field(places[k])));
+        }
+        match stamp.filter(|_| row[..needed].iter().any(Option::is_some)) {
+            Some(stamp) => {
                 t_s.push(stamp - *first.get_or_insert(stamp));
-                table.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
+                table.iter_mut().zip(row).for_each(|(column, value)| column.push(value.unwrap_or(f64::NAN)));
             }
-            (stamp, _) => {
-                masked += 1;
-                unread.get_or_insert_with(|| {
-                    let line = record.position().map_or(0, |p| p.line() as usize);
-                    let field = |k: usize| record.get(k).unwrap_or_default();
-                    if stamp.is_none() {
-                        let form = format.map_or("a time".to_owned(), |format| format!("a time as {format}"));
-                        return (line, format!("{form} in column {time}"), field(time_at).to_owned());
-                    }
-                    let is_number = |k: usize| field(k).parse::<f64>().is_ok_and(f64::is_finite);
-                    let (k, column) =
-                        places.iter().zip(wanted).find(|(k, _)| !is_number(**k)).unwrap_or((&0, &wanted[0]));
-                    (line, format!("a number in column {}", column.name), field(*k).to_owned())
-                });
-            }
+            None => masked += 1,
         }
     }
-    // Holes are left out; a file that is mostly holes is another than the case says.
-    if let Some((line, expected, found)) = unread.filter(|_| t_s.len() < masked) {
-        let all = masked + t_s.len();
-        return Err(bad(line, format!("{expected} ({masked} of {all} rows cannot be read)"), found));
+    // Holes are left out; a file, or a column of it, that is mostly holes is another than the case says.
+    let all = masked + t_s.len();
+    let holes = |k: usize| match k {
+        0 => masked,
+        k => all - table[k - 1].iter().filter(|v| v.is_finite()).count(),
+    };
+    let is_mostly = |k: &usize| 2 * holes(*k) > all;
+    // Of several covariates one may be; that of the only one is no case.
+    let mut covariates = needed + 1..=wanted.len();
+    let none_read = covariates.clone().all(|k| is_mostly(&k)).then(|| covariates.next()).flatten();
+    let mostly = (0..=needed).find(is_mostly).or(none_read).and_then(|k| Some((k, unread[k].clone()?)));
+    if let Some((k, (line, expected, found))) = mostly {
+        return Err(bad(line, format!("{expected} ({} of {all} rows cannot be read)", holes(k)), found));
     }
     let (t_s, table) = in_order(t_s, table);
     Ok((t_s, table, masked))
@@ -303,10 +327,19 @@ fn blocks(t_s: &[f64], table: &[Vec<f64>], spans: &[[f64; 2]], count: f64) -> Bl
     for ((span, _), rows) in members.into_iter().filter(|((span, _), _)| long[*span]) {
         let kept = agreeing(&rows, table);
         out.masked += rows.len() - kept.len();
-        let mean = |column: &[f64]| kept.iter().map(|i| column[*i]).sum::<f64>() / kept.len() as f64;
+        let mean = |column: &[f64]| {
+            let read: Vec<f64> = kept.iter().map(|i| column[*i]).filter(|v| v.is_finite()).collect();
+            read.iter().sum::<f64>() / read.len() as f64
+        };
+        let means: Vec<f64> = table.iter().map(|column| mean(column)).collect();
+        // A block in which a column has no number is a gap.
+        if means.iter().any(|mean| mean.is_nan()) {
+            out.masked += kept.len();
+            continue;
+        }
         out.t_s.push(mean(t_s));
         out.span.push(span);
-        out.table.iter_mut().zip(table).for_each(|(block, column)| block.push(mean(column)));
+        out.table.iter_mut().zip(means).for_each(|(block, mean)| block.push(mean));
     }
     out
 }
@@ -320,12 +353,14 @@ fn agreeing(rows: &[usize], table: &[Vec<f64>]) -> Vec<usize> {
     let limits: Vec<(f64, f64)> = table
         .iter()
         .map(|column| {
-            let values: Vec<f64> = rows.iter().map(|i| column[*i]).collect();
+            let values: Vec<f64> = rows.iter().map(|i| column[*i]).filter(|v| v.is_finite()).collect();
             let width = scatter(&values);
             (median(values), if width > 0.0 { BLUNDER_SCATTERS * width } else { f64::INFINITY })
         })
         .collect();
-    let agrees = |i: &&usize| table.iter().zip(&limits).all(|(column, (m, w))| (column[**i] - m).abs() <= *w);
+    let agrees = |i: &&usize| {
+        table.iter().zip(&limits).all(|(column, (m, w))| column[**i].is_nan() || (column[**i] - m).abs() <= *w)
+    };
     let kept: Vec<usize> = rows.iter().filter(agrees).copied().collect();
     // A block that falls apart is no block with blunders.
     if 2 * kept.len() > rows.len() { kept } else { rows.to_vec() }

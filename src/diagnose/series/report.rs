@@ -38,11 +38,19 @@ pub fn answer(case: &MeasuredCase, series: &Series, found: &[AxisFound]) -> Answ
     let refused = measured.iter().map(|row| row.found.refused).fold(0.0, f64::max);
     let score = if weakest.is_finite() { weakest } else { refused };
     let notes = arcs.iter().filter_map(|arc| arc.note.as_ref().map(|note| format!("{}: {note}", arc.id)));
+    let controls = rows.iter().zip(&arcs).filter(|(row, _)| row.axis.control).filter_map(|(_, arc)| of_control(arc));
+    let unread = series.unread.iter().map(|name| {
+        format!("{name} cannot be read in most rows, and nothing was asked of it: what is not asked is not excluded.")
+    });
     Answer {
         schema: "oare.diagnosis/1".to_owned(),
         case: case.id.clone(),
         verdict,
-        false_alarm_probability: (-0.5 * score).exp().clamp(LEAST_PROBABILITY, 1.0),
+        // What does not predict, or is smaller than its error, is no proof of anything: such evidence is that of a claim at most.
+        false_alarm_probability: match verdict {
+            Verdict::Consistent => (-0.5 * score.min(SCORE_MIN)).exp(),
+            _ => (-0.5 * score).exp().max(LEAST_PROBABILITY),
+        },
         located: located(&measured),
         alternatives: Vec::new(),
         hypothesis: measured
@@ -56,10 +64,25 @@ pub fn answer(case: &MeasuredCase, series: &Series, found: &[AxisFound]) -> Answ
         separating_observation: None,
         cannot_tell_apart: Vec::new(),
         steps: Vec::new(),
-        notes: notes.collect(),
+        notes: notes.chain(controls).chain(unread).collect(),
         effects: in_order(effects),
         arcs,
     }
+}
+
+/// What is said of a control in which something is found.
+fn of_control(arc: &ArcAnswer) -> Option<String> {
+    let ids: Vec<&str> = arc.effects.iter().map(|effect| effect.id.as_str()).collect();
+    let what = match arc.verdict {
+        Verdict::Consistent => return None,
+        Verdict::Unexplained => "something that no effect of the catalogue is".to_owned(),
+        _ => ids.join(" + "),
+    };
+    Some(format!(
+        "{} is a control, in which nothing is expected, and has {what}: whatever moves it may move the measured axes as well, and what is said of \
+         them is no better than that.",
+        arc.id
+    ))
 }
 
 /// One axis with what was found in it.
@@ -131,7 +154,7 @@ impl Row<'_> {
             }
             Follows::Scale => vec![parameter("fraction", value, sigma, "1")],
             Follows::Offset(_) => vec![parameter("offset_s", value, sigma, "s")],
-            Follows::Form(..) | Follows::Product(..) => Vec::new(),
+            Follows::Form(..) | Follows::Product(..) | Follows::Pulse(..) | Follows::Line(..) => Vec::new(),
         }
     }
 
@@ -191,6 +214,10 @@ impl Row<'_> {
                 let [one, other] = [k, j].map(|k| &self.series.covariates[*k].name);
                 format!("({one} - <{one}>) ({other} - <{other}>)")
             }
+            Follows::Pulse(from_s, length_s) => format!("(1 from {from_s:.0} s to {:.0} s, else 0)", from_s + length_s),
+            Follows::Line(period_s, phase) => {
+                format!("sin(2 pi (t - {:.0} s)/{period_s:.0} s + {phase:.2})", self.series.t_s[0])
+            }
             _ => return None,
         };
         Some(Hypothesis {
@@ -233,8 +260,10 @@ impl Row<'_> {
             if !limit.is_finite() {
                 continue;
             }
-            let unit = format!("{} on {}", follows.unit(&self.axis.unit, self.series), self.axis.column);
-            let what = format!("{} {}", follows.id(), follows.of_what(self.series));
+            let (unit, of) = (follows.unit(&self.axis.unit, self.series), follows.of_what(self.series));
+            let of_covariate = if of == follows.id() { String::new() } else { format!(", of {of}") };
+            let unit = format!("{unit} on {}{of_covariate}", self.axis.column);
+            let what = format!("{} {of}", follows.id());
             match limits.iter_mut().find(|(other, _)| *other == what) {
                 Some((_, loosest)) => loosest.limit = loosest.limit.max(limit),
                 None => limits.push((what, Limit { id: follows.id().to_owned(), limit, unit })),
@@ -313,8 +342,12 @@ fn joined(name: &str, each: &[ParameterAnswer]) -> ParameterAnswer {
 
 fn fit(measured: &[&Row<'_>]) -> Fit {
     let level = |rms: Vec<f64>| {
-        let chi2 = rms.iter().zip(measured).map(|(rms, row)| (rms / row.floor()).powi(2));
-        Level { rms_total: rms.iter().map(|r| r * r).sum::<f64>().sqrt(), whitened_chi2_per_dof: median(chi2), rms }
+        let chi2: f64 = rms.iter().zip(measured).map(|(rms, row)| (rms / row.floor()).powi(2)).sum();
+        Level {
+            rms_total: rms.iter().map(|r| r * r).sum::<f64>().sqrt(),
+            whitened_chi2_per_dof: chi2 / (measured.len() as f64).max(1.0),
+            rms,
+        }
     };
     let power = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
     let before_rms: Vec<f64> = measured.iter().map(|row| held_out(row.series, row.axis, &row.found.included)).collect();

@@ -22,7 +22,12 @@ const DRIFTS: [f64; 4] = [0.05, 0.15, 0.5, 5.0];
 /// The likeliest instants of a step that are weighed in full.
 const STEPS: usize = 3;
 /// The longest delay tried, as a part of the record: of what is later still too little is left to be predicted.
-const DELAY_MAX: f64 = 0.1;
+const DELAY_MAX: f64 = 0.2;
+/// Places between which a push for a while is looked for, and how many of such, and of oscillations, are weighed in full.
+const EDGES: usize = 40;
+const IN_TIME: usize = 3;
+/// A step or a decay smaller than so many of its own standard errors is nothing to claim, however much likelier it makes the series.
+const CLAIMED_SIGMA: f64 = 3.0;
 /// Offsets tried against a reference, in samples, either way.
 const OFFSETS: [f64; 11] = [0.0, 1.0, 2.0, 4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0];
 /// Held-out prediction leaves out blocks of this length in turn, s, or of an eighth of the shortest span.
@@ -171,7 +176,8 @@ fn best_form(
     listed: f64,
     beat: &Beat,
 ) -> Option<(Follows, f64, Regression)> {
-    let (form, score) = best_of(series, axis, included, forms(series), beat).best?;
+    let in_time = likely_in_time(series, axis, included, beat);
+    let (form, score) = best_of(series, axis, included, [forms(series), in_time].concat(), beat).best?;
     if score < FORM_SCORE_MIN.max(listed + FORM_MARGIN) {
         return None;
     }
@@ -214,8 +220,22 @@ fn best_of(series: &Series, axis: &Axis, model: &[Follows], candidates: Vec<Foll
         all.iter().all(|(other, s)| Some(*other) != immediate || *score > s + LATE_MARGIN)
     });
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let before = held_out(series, axis, model);
-    let best = scored.into_iter().find(|(candidate, _)| held_out(series, axis, &with(*candidate)) < before);
+    // A step or a decay is told beside whatever else moves the axis; what it does not stand out of, its error in red noise says.
+    let stands = |candidate: Follows| {
+        let (value, sigma) = regress(series, axis, &with(candidate)).coefficients[model.len()];
+        !matches!(candidate, Follows::Step(_) | Follows::Drift(_)) || value.abs() > CLAIMED_SIGMA * sigma
+    };
+    let predicts = |candidate: Follows| {
+        let block_s = match candidate {
+            // What lasts for a while is foretold by other parts of it.
+            Follows::Pulse(_, length_s) => block_s(series).min(0.25 * length_s).max(series.beat_s()),
+            _ => block_s(series),
+        };
+        let [before, after] =
+            [model, &with(candidate)].map(|model| rms_missed(missed_in(series, axis, model, block_s)));
+        after < before
+    };
+    let best = scored.into_iter().find(|(candidate, _)| predicts(*candidate) && stands(*candidate));
     Step { best, strongest }
 }
 
@@ -277,21 +297,79 @@ fn likely_steps(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) ->
     tried.iter().take(STEPS).map(|(i, _)| Follows::Step(between(*i))).collect()
 }
 
-/// The likeliest delays of every temperature, each multiple of a beat tried in the noise that the model has without one.
+/// The likeliest delays of every temperature, each multiple of a beat tried: in the noise that the model has without one, and in that which it
+/// has with the likeliest of those, or with the likeliest response in a time constant. Without, what follows late is taken for slow noise,
+/// beside which one delay is hardly likelier than another.
 fn likely_delays(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Vec<Follows> {
-    let without = equation(series, axis, model);
-    let (noise, _) = red::best(&without.values, &design(series, &without), beat);
+    let noise_with = |more: &[Follows]| {
+        let equation = equation(series, axis, &[model, more].concat());
+        red::best(&equation.values, &design(series, &equation), beat).0
+    };
     let longest = (DELAY_MAX * series.t_s.len() as f64).min(REACH_S / series.beat_s()) as usize;
+    let likeliest = |tried: &[Follows], noise| {
+        let at = |follows: &Follows| {
+            let equation = equation(series, axis, &[model, &[*follows]].concat());
+            (*follows, red::in_noise(&equation.values, &design(series, &equation), beat, noise))
+        };
+        tried.iter().map(at).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(follows, _)| follows)
+    };
+    let without = noise_with(&[]);
     let temperatures = series.covariates.iter().enumerate().filter(|(_, covariate)| covariate.is_temperature());
     let of_one = |(k, _)| {
-        let at = |beats: usize| {
-            let follows = Follows::Delayed(k, beats as f64 * series.beat_s());
-            let equation = equation(series, axis, &[model, &[follows]].concat());
-            (follows, red::in_noise(&equation.values, &design(series, &equation), beat, noise))
-        };
-        (1..=longest).map(at).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(follows, _)| follows)
+        let delays: Vec<Follows> =
+            (1..=longest).map(|beats| Follows::Delayed(k, beats as f64 * series.beat_s())).collect();
+        let constants: Vec<Follows> = candidates(series, axis)
+            .into_iter()
+            .filter(|c| matches!(c, Follows::Temperature(of, _) if *of == k))
+            .collect();
+        let first: Vec<Follows> =
+            [&delays, &constants].into_iter().filter_map(|tried| likeliest(tried, without)).collect();
+        let again = first.iter().filter_map(|with| likeliest(&delays, noise_with(&[*with])));
+        let mut all: Vec<Follows> = likeliest(&delays, without).into_iter().chain(again).collect();
+        all.dedup();
+        all
     };
-    temperatures.filter_map(of_one).collect()
+    temperatures.flat_map(of_one).collect()
+}
+
+/// The likeliest pushes for a while, their ends some of a grid over the record, in the noise that the model has without one; and the likeliest
+/// oscillations, but for those of a day, which a temperature has.
+fn likely_in_time(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Vec<Follows> {
+    let without = equation(series, axis, model);
+    let (noise, _) = red::best(&without.values, &design(series, &without), beat);
+    let likelier = |more: &[Follows]| {
+        let equation = equation(series, axis, &[model, more].concat());
+        red::in_noise(&equation.values, &design(series, &equation), beat, noise)
+    };
+    let (t_s, n) = (&series.t_s, series.t_s.len());
+    let span_s = t_s[n - 1] - t_s[0];
+    let first_of = |mut all: Vec<(Follows, f64)>| {
+        all.sort_by(|a, b| b.1.total_cmp(&a.1));
+        all.truncate(IN_TIME);
+        all.into_iter().map(|(follows, _)| follows).collect::<Vec<Follows>>()
+    };
+    let edges: Vec<f64> = (1..EDGES).map(|i| 0.5 * (t_s[i * (n - 1) / EDGES] + t_s[i * (n - 1) / EDGES + 1])).collect();
+    let pairs = edges.iter().enumerate().flat_map(|(i, from)| edges[i + 1..].iter().map(move |to| (*from, to - from)));
+    let mut pulses = Vec::new();
+    if n > 2 * EDGES {
+        let tried = pairs.map(|(from, length)| Follows::Pulse(from, length));
+        pulses = first_of(tried.map(|pulse| (pulse, likelier(&[pulse]))).collect());
+    }
+    let apart = |cycles: f64| {
+        let days = span_s / 86_400.0;
+        (1..=2).all(|k| (cycles - f64::from(k) * days).abs() > 1.0)
+    };
+    let quickest = n as f64 / 4.0;
+    let cycles = (4..).map(|i| 0.5 * f64::from(i)).take_while(|cycles| *cycles < quickest).filter(|c| apart(*c));
+    let line = |cycles: f64| {
+        let both = [0.0, 0.25].map(|turn| Follows::Line(span_s / cycles, turn * std::f64::consts::TAU));
+        let score = likelier(&both);
+        let fit = plain(series, axis, &[model, &both].concat());
+        let [sine, cosine] = [fit[model.len()], fit[model.len() + 1]];
+        (Follows::Line(span_s / cycles, cosine.atan2(sine)), score)
+    };
+    let lines = first_of(cycles.map(line).collect());
+    pulses.into_iter().chain(lines).collect()
 }
 
 /// Move the inner number of every effect found to where the likelihood is best, one after the other.
@@ -303,9 +381,13 @@ fn refined(series: &Series, axis: &Axis, model: &mut [Follows], from: usize, bea
             likelihood(series, axis, model, beat)
         };
         match model[i] {
-            Follows::Temperature(_, s) | Follows::Delayed(_, s) | Follows::Drift(s) | Follows::Form(.., s)
-                if s > 0.0 =>
-            {
+            // All multiples of a beat were tried, and between two of them it is smooth.
+            Follows::Delayed(_, s) => {
+                let beat_s = series.beat_s();
+                let best = golden((s - beat_s).max(0.0), s + beat_s, 14, &mut |x| at(model, x));
+                model[i] = model[i].with_inner(best);
+            }
+            Follows::Temperature(_, s) | Follows::Drift(s) | Follows::Form(.., s) if s > 0.0 => {
                 let longest_s = if model[i].id() == "temperature_bias" { REACH_S } else { f64::INFINITY };
                 let high = (s.ln() + 0.7).min(longest_s.ln());
                 let log = golden(s.ln() - 0.7, high, 14, &mut |x| at(model, x.exp()));
@@ -414,20 +496,29 @@ fn widen(
 
 /// Rms of the prediction of blocks left out in turn, a constant per span known only from the rest.
 pub fn held_out(series: &Series, axis: &Axis, effects: &[Follows]) -> f64 {
-    match missed(series, axis, effects) {
-        Some(blocks) => {
-            let (squares, n) = blocks.iter().fold((0.0, 0), |(squares, n), block| (squares + block.0, n + block.1));
-            (squares / n as f64).sqrt()
-        }
-        None => f64::INFINITY,
-    }
+    rms_missed(missed(series, axis, effects))
+}
+
+fn rms_missed(blocks: Option<Vec<(f64, usize)>>) -> f64 {
+    blocks.map_or(f64::INFINITY, |blocks| {
+        let (squares, n) = blocks.iter().fold((0.0, 0), |(squares, n), block| (squares + block.0, n + block.1));
+        (squares / n as f64).sqrt()
+    })
 }
 
 /// What every block is missed by: sum of squares, and of how many values. None where the rest does not determine the model.
 pub fn missed(series: &Series, axis: &Axis, effects: &[Follows]) -> Option<Vec<(f64, usize)>> {
+    missed_in(series, axis, effects, block_s(series))
+}
+
+/// Length of the blocks that are left out.
+fn block_s(series: &Series) -> f64 {
+    HELD_OUT_S.max(HELD_OUT_BLOCKS_MIN * series.beat_s()).min(series.shortest_span_s() / 8.0).max(1e-9)
+}
+
+fn missed_in(series: &Series, axis: &Axis, effects: &[Follows], block_s: f64) -> Option<Vec<(f64, usize)>> {
     let equation = equation(series, axis, effects);
     let (design, values) = (design(series, &equation), &equation.values);
-    let block_s = HELD_OUT_S.max(HELD_OUT_BLOCKS_MIN * series.beat_s()).min(series.shortest_span_s() / 8.0).max(1e-9);
     let block = |i: usize| ((series.t_s[i] - series.t_s[0]) / block_s) as usize;
     let mut blocks = vec![(0.0, 0); block(values.len() - 1) + 1];
     for left_out in 0..2 {

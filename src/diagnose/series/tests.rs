@@ -17,7 +17,7 @@ fn series(rng: &mut ChaCha12Rng) -> Series {
     let wander = red(rng, 60.0, 0.0);
     let values = t_s.iter().zip(wander).map(|(t, w)| 25.0 + 2.0 * (t / 13_751.0).sin() + 0.5 * w).collect();
     let covariates = vec![covariate("temperature", "C", values)];
-    Series { t_s, span: vec![0; BLOCKS], spans: 1, axes: Vec::new(), covariates, masked: 0 }
+    Series { t_s, span: vec![0; BLOCKS], spans: 1, axes: Vec::new(), covariates, unread: Vec::new(), masked: 0 }
 }
 
 fn covariate(name: &str, unit: &str, values: Vec<f64>) -> CovariateSeries {
