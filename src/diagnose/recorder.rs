@@ -16,6 +16,7 @@ use crate::math::rms::about_mean;
 use crate::pipeline::calibration::{
     Anomaly, Bias, BiasMeasurement, Calibration, Provenance, bias_law::PARAMETERS, saturation,
 };
+use crate::pipeline::ledger::Ledger;
 use crate::pipeline::station::{Station, replay};
 use crate::pipeline::window::Window;
 use crate::pipeline::{PlaybackId, Product, Settings};
@@ -116,8 +117,30 @@ pub fn taken(station: &Station, span_s: [f64; 2]) -> Taken {
         answered: saturation::is_answered(station.archive(), a),
     };
     taken.recording.faults = station.derived().anomalies.iter().map(fault).collect();
+    taken.recording.not_come = not_come(station.ledger());
     taken.measurements = station.derived().measurements.clone();
     taken
+}
+
+/// What was refused of frames and packets, and the seconds between the first and the last that nothing came of.
+fn not_come(ledger: &Ledger) -> Option<String> {
+    let total = ledger.total();
+    let mut said = Vec::new();
+    let frames: u64 = total.frames_refused.values().sum();
+    if frames > 0 {
+        let by: Vec<String> = total.frames_refused.iter().map(|(why, n)| format!("{} {n}", why.word())).collect();
+        said.push(format!("{frames} of {} frames are refused ({})", total.frames_found, by.join(", ")));
+    }
+    if !total.packets_refused.is_empty() {
+        let by: Vec<String> = total.packets_refused.iter().map(|(why, n)| format!("{why} {n}")).collect();
+        said.push(format!("packets are refused ({})", by.join(", ")));
+    }
+    let gaps = ledger.seconds.gaps();
+    if !gaps.is_empty() {
+        let missing: i64 = gaps.iter().map(|(from, to)| to - from).sum();
+        said.push(format!("{missing} s in {} gaps have no science record", gaps.len()));
+    }
+    (!said.is_empty()).then(|| format!("of the dump {}", said.join("; ")))
 }
 
 impl Taken {

@@ -61,6 +61,7 @@ mod tests {
             bias_errors_ng: [const { Vec::new() }; 3],
             bias_laws: [const { Vec::new() }; 3],
             faults: Vec::new(),
+            not_come: None,
             clock_s,
         }
     }

@@ -60,6 +60,8 @@ pub struct Recording {
     pub bias_laws: [Vec<FittedLaw>; 3],
     /// What was wrong with the instrument, as far as its own dump tells.
     pub faults: Vec<Fault>,
+    /// What did not come of the frames of a dump, in words; `None` where all did.
+    pub not_come: Option<String>,
 }
 
 /// A fault of the instrument that the calibration found in a dump.
@@ -357,6 +359,7 @@ fn take(recording: &Recording, keep: &[usize]) -> Recording {
         bias_errors_ng: recording.bias_errors_ng.each_ref().map(|axis| axis.iter().map(pick).collect()),
         bias_laws: recording.bias_laws.each_ref().map(|axis| axis.iter().map(|law| law.at(keep)).collect()),
         faults: recording.faults.clone(),
+        not_come: recording.not_come.clone(),
     }
 }
 

@@ -15,10 +15,8 @@ const EDGE_EPOCHS: usize = 4;
 const PROVISIONAL: f64 = 0.1;
 /// In any case what one arc has for itself must leave less than this part.
 pub(super) const LEFT_MAX: f64 = 0.2;
-/// A step is told from an unlisted push that lasts when it is this many times what such a push gains over the arc; or as much as it, where
-/// nothing is left beside the stated accuracy, so many times: a push that lasts is no step.
+/// A step is told from an unlisted push that lasts when it is this many times what such a push gains over the arc.
 const UNLISTED_TIMES: f64 = 10.0;
-const ACCURATE: f64 = 1.2;
 /// Unknowns of a velocity step.
 const UNKNOWNS: f64 = 4.0;
 
@@ -54,9 +52,7 @@ pub fn step(problem: &Problem, level: &Level, rivals: &[f64]) -> Option<Level> {
         }
         let Some(tried) = fitted(problem, level, i) else { continue };
         let is = tried.rms_m(0..arc.fitted);
-        let accurate = is <= ACCURATE * 3f64.sqrt() * problem.sigma_m;
-        let least_m_s = least_m_s(arc) / if accurate { UNLISTED_TIMES } else { 1.0 };
-        let small = tried.impulse.is_none_or(|impulse| impulse.dv_m_s.norm() < least_m_s);
+        let small = tried.impulse.is_none_or(|impulse| impulse.dv_m_s.norm() < least_m_s(arc));
         if small || is > LEFT_MAX * was {
             continue;
         }
@@ -118,7 +114,7 @@ fn fitted(problem: &Problem, level: &Level, i: usize) -> Option<ArcFit> {
     });
     let (k, step, left) = tried.min_by(|a, b| a.2.total_cmp(&b.2))?;
     // Linear columns see an orbit that is still bent to the step: only what is far from enough is turned away here.
-    if left > 0.25 * y.norm_squared() || step.norm() < 0.3 * least_m_s(arc) / UNLISTED_TIMES {
+    if left > 0.25 * y.norm_squared() || step.norm() < 0.3 * least_m_s(arc) {
         return None;
     }
     let mut from = fit.clone();
@@ -170,14 +166,24 @@ fn described(problem: &Problem, level: &Level, i: usize) -> Option<Manoeuvre> {
         }
         (impulse.dv_m_s.dot(direction), weights.dot(&(&covariance * &weights)).max(0.0).sqrt())
     };
-    let [radial, normal] = radial_and_normal(&arc.t_s, &arc.observed_m, impulse.at_s);
     let at = 6 + active + 3;
+    let at_sigma_s = covariance[(at, at)].max(0.0).sqrt();
+    let directions = |at_s: f64| {
+        let [radial, normal] = radial_and_normal(&arc.t_s, &arc.observed_m, at_s);
+        [radial, normal.cross(&radial), normal]
+    };
+    // The directions turn with the instant, which has an error as well.
+    let [there, later] = [impulse.at_s, impulse.at_s + at_sigma_s].map(directions);
+    let turned = |k: usize| {
+        let (value, sigma) = of(&there[k]);
+        (value, sigma.hypot(impulse.dv_m_s.dot(&(later[k] - there[k]))))
+    };
     Some(Manoeuvre {
         arc: i,
         impulse,
         dv_m_s: of(&impulse.dv_m_s.normalize()),
-        rtn_m_s: [radial, normal.cross(&radial), normal].map(|direction| of(&direction)),
-        at_sigma_s: covariance[(at, at)].max(0.0).sqrt(),
+        rtn_m_s: [0, 1, 2].map(turned),
+        at_sigma_s,
         score: score(arc, fit, rms_m),
         rms_m,
     })

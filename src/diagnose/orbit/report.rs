@@ -260,7 +260,7 @@ fn arc_answer(problem: &Problem, search: &Search, end: &Level, table: &Table, i:
     let left = rms_after > problem.rms_max_m();
     let (verdict, effects, fitted_beside, note) = if left {
         let note = format!(
-            "{} remain where {:.3} m is the most that the stated accuracy allows; nothing in the catalogue removes it.",
+            "{} remain where {:.3} m is the most that the stated accuracy allows; nothing in the catalogue that is larger than the pushes that satellites have and no list does removes it.",
             if rms_after.is_finite() {
                 format!("{rms_after:.3} m")
             } else {

@@ -12,7 +12,8 @@ const LOG_AWAY_S: f64 = 2.0 * 86_400.0;
 
 /// All of it, in sentences.
 pub fn of_inputs(scene: &Scene) -> Vec<String> {
-    let mut notes = of_windows(scene);
+    let mut notes: Vec<String> = scene.case.recording.not_come.iter().cloned().collect();
+    notes.extend(of_windows(scene));
     notes.extend(of_the_log(scene));
     notes.extend(of_the_noise(scene));
     notes
