@@ -94,6 +94,28 @@ fn follows(case: &str, text: &str, expected: f64) {
     assert!((value - expected).abs() < 3.0 * sigma && sigma < 0.2 * expected.abs(), "{value} +- {sigma}");
 }
 
+/// A covariate that nobody can read is told, and the others serve; a control in which something is found is told.
+#[test]
+fn an_unreadable_covariate_and_a_control_that_responds_are_told() {
+    let mut text = String::from("t,temp,hum,a,gx\n");
+    for [t, temperature, a] in rows(2_000, 60.0) {
+        let _ = writeln!(text, "{t},{temperature:.5},,{a:.5},{a:.5}");
+    }
+    let case = series_case(
+        "time = { column = \"t\" }\nvalues = [{ column = \"a\", unit = \"g\", axis = \"x\" }]\n\
+         controls = [{ column = \"gx\", unit = \"rad/s\" }]\n\
+         covariates = [{ column = \"temp\", unit = \"C\" }, { column = \"hum\", unit = \"%\" }]",
+    );
+    let (answer, ids) = answered(&case, &[("s.csv", &text)]);
+    assert_eq!(ids, ["temperature_bias"]);
+    let notes: Vec<&str> = answer["notes"].as_array().unwrap().iter().filter_map(|note| note.as_str()).collect();
+    assert!(notes.iter().any(|note| note.starts_with("hum cannot be read")), "{notes:?}");
+    assert!(
+        notes.iter().any(|note| note.starts_with("gx is a control") && note.contains("temperature_bias")),
+        "{notes:?}"
+    );
+}
+
 #[test]
 fn a_series_of_any_rate_gives_its_slope() {
     for (count, step_s) in [(6_000, 0.1), (9_000, 1.0), (2_000, 60.0), (1_500, 600.0), (400, 3_600.0), (90, 86_400.0)] {

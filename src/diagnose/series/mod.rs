@@ -6,6 +6,7 @@
 
 pub mod follow;
 pub mod form;
+mod likely;
 pub mod read;
 mod red;
 mod report;

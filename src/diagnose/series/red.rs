@@ -65,6 +65,11 @@ pub struct Noise {
     white: f64,
 }
 
+impl Noise {
+    /// Hardly any wander: what is in it for longer than a few samples is something else.
+    pub const QUIET: Self = Self { wander: Wander::One(1), white: 0.6 };
+}
+
 fn grid() -> impl Iterator<Item = Noise> {
     Wander::all().flat_map(|wander| WHITES.iter().map(move |white| Noise { wander, white: *white }))
 }

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::follow::{Equation, Follows, equation};
 use super::form::Form;
+use super::likely::{likely_delays, likely_lines, likely_pulses, likely_steps};
 use super::read::{Axis, CovariateSeries, Series};
 use super::red::{self, Beat};
 use crate::diagnose::earlier::REACH_S;
@@ -19,13 +20,6 @@ const LATE_MARGIN: f64 = 18.0;
 /// Time constants tried for a late response, as parts of the span, beside none at all.
 const LAGS: [f64; 8] = [0.0015, 0.003, 0.006, 0.0125, 0.025, 0.05, 0.1, 0.2];
 const DRIFTS: [f64; 4] = [0.05, 0.15, 0.5, 5.0];
-/// The likeliest instants of a step that are weighed in full.
-const STEPS: usize = 3;
-/// The longest delay tried, as a part of the record: of what is later still too little is left to be predicted.
-const DELAY_MAX: f64 = 0.2;
-/// Places between which a push for a while is looked for, and how many of such, and of oscillations, are weighed in full.
-const EDGES: usize = 40;
-const IN_TIME: usize = 3;
 /// A step or a decay smaller than so many of its own standard errors is nothing to claim, however much likelier it makes the series.
 const CLAIMED_SIGMA: f64 = 3.0;
 /// Offsets tried against a reference, in samples, either way.
@@ -87,7 +81,7 @@ pub fn regress(series: &Series, axis: &Axis, effects: &[Follows]) -> Regression 
 }
 
 /// Constants per span, then the effects about their means.
-fn design(series: &Series, equation: &Equation) -> DMatrix<f64> {
+pub(super) fn design(series: &Series, equation: &Equation) -> DMatrix<f64> {
     let n = series.t_s.len();
     let mut design = DMatrix::zeros(n, series.spans + equation.columns.len());
     for (i, span) in series.span.iter().enumerate() {
@@ -176,8 +170,9 @@ fn best_form(
     listed: f64,
     beat: &Beat,
 ) -> Option<(Follows, f64, Regression)> {
-    let in_time = likely_in_time(series, axis, included, beat);
-    let (form, score) = best_of(series, axis, included, [forms(series), in_time].concat(), beat).best?;
+    let pulses = likely_pulses(series, axis, included, beat);
+    let lines = likely_lines(series, axis, included, beat);
+    let (form, score) = best_of(series, axis, included, [forms(series), pulses, lines].concat(), beat).best?;
     if score < FORM_SCORE_MIN.max(listed + FORM_MARGIN) {
         return None;
     }
@@ -278,100 +273,6 @@ pub fn candidates(series: &Series, axis: &Axis) -> Vec<Follows> {
     all
 }
 
-/// The instants at which a step is likeliest, each moment between two blocks tried in the noise that the model has without
-/// one; not within a fortieth of either end.
-fn likely_steps(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Vec<Follows> {
-    let without = equation(series, axis, model);
-    let (noise, _) = red::best(&without.values, &design(series, &without), beat);
-    let n = series.t_s.len();
-    let between = |i: usize| 0.5 * (series.t_s[i - 1] + series.t_s[i]);
-    let at = |i: usize| {
-        let mut with = model.to_vec();
-        with.push(Follows::Step(between(i)));
-        let equation = equation(series, axis, &with);
-        (i, red::in_noise(&equation.values, &design(series, &equation), beat, noise))
-    };
-    let margin = (n / 40).max(2);
-    let mut tried: Vec<(usize, f64)> = (margin..n - margin).map(at).collect();
-    tried.sort_by(|a, b| b.1.total_cmp(&a.1));
-    tried.iter().take(STEPS).map(|(i, _)| Follows::Step(between(*i))).collect()
-}
-
-/// The likeliest delays of every temperature, each multiple of a beat tried: in the noise that the model has without one, and in that which it
-/// has with the likeliest of those, or with the likeliest response in a time constant. Without, what follows late is taken for slow noise,
-/// beside which one delay is hardly likelier than another.
-fn likely_delays(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Vec<Follows> {
-    let noise_with = |more: &[Follows]| {
-        let equation = equation(series, axis, &[model, more].concat());
-        red::best(&equation.values, &design(series, &equation), beat).0
-    };
-    let longest = (DELAY_MAX * series.t_s.len() as f64).min(REACH_S / series.beat_s()) as usize;
-    let likeliest = |tried: &[Follows], noise| {
-        let at = |follows: &Follows| {
-            let equation = equation(series, axis, &[model, &[*follows]].concat());
-            (*follows, red::in_noise(&equation.values, &design(series, &equation), beat, noise))
-        };
-        tried.iter().map(at).max_by(|a, b| a.1.total_cmp(&b.1)).map(|(follows, _)| follows)
-    };
-    let without = noise_with(&[]);
-    let temperatures = series.covariates.iter().enumerate().filter(|(_, covariate)| covariate.is_temperature());
-    let of_one = |(k, _)| {
-        let delays: Vec<Follows> =
-            (1..=longest).map(|beats| Follows::Delayed(k, beats as f64 * series.beat_s())).collect();
-        let constants: Vec<Follows> = candidates(series, axis)
-            .into_iter()
-            .filter(|c| matches!(c, Follows::Temperature(of, _) if *of == k))
-            .collect();
-        let first: Vec<Follows> =
-            [&delays, &constants].into_iter().filter_map(|tried| likeliest(tried, without)).collect();
-        let again = first.iter().filter_map(|with| likeliest(&delays, noise_with(&[*with])));
-        let mut all: Vec<Follows> = likeliest(&delays, without).into_iter().chain(again).collect();
-        all.dedup();
-        all
-    };
-    temperatures.flat_map(of_one).collect()
-}
-
-/// The likeliest pushes for a while, their ends some of a grid over the record, in the noise that the model has without one; and the likeliest
-/// oscillations, but for those of a day, which a temperature has.
-fn likely_in_time(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Vec<Follows> {
-    let without = equation(series, axis, model);
-    let (noise, _) = red::best(&without.values, &design(series, &without), beat);
-    let likelier = |more: &[Follows]| {
-        let equation = equation(series, axis, &[model, more].concat());
-        red::in_noise(&equation.values, &design(series, &equation), beat, noise)
-    };
-    let (t_s, n) = (&series.t_s, series.t_s.len());
-    let span_s = t_s[n - 1] - t_s[0];
-    let first_of = |mut all: Vec<(Follows, f64)>| {
-        all.sort_by(|a, b| b.1.total_cmp(&a.1));
-        all.truncate(IN_TIME);
-        all.into_iter().map(|(follows, _)| follows).collect::<Vec<Follows>>()
-    };
-    let edges: Vec<f64> = (1..EDGES).map(|i| 0.5 * (t_s[i * (n - 1) / EDGES] + t_s[i * (n - 1) / EDGES + 1])).collect();
-    let pairs = edges.iter().enumerate().flat_map(|(i, from)| edges[i + 1..].iter().map(move |to| (*from, to - from)));
-    let mut pulses = Vec::new();
-    if n > 2 * EDGES {
-        let tried = pairs.map(|(from, length)| Follows::Pulse(from, length));
-        pulses = first_of(tried.map(|pulse| (pulse, likelier(&[pulse]))).collect());
-    }
-    let apart = |cycles: f64| {
-        let days = span_s / 86_400.0;
-        (1..=2).all(|k| (cycles - f64::from(k) * days).abs() > 1.0)
-    };
-    let quickest = n as f64 / 4.0;
-    let cycles = (4..).map(|i| 0.5 * f64::from(i)).take_while(|cycles| *cycles < quickest).filter(|c| apart(*c));
-    let line = |cycles: f64| {
-        let both = [0.0, 0.25].map(|turn| Follows::Line(span_s / cycles, turn * std::f64::consts::TAU));
-        let score = likelier(&both);
-        let fit = plain(series, axis, &[model, &both].concat());
-        let [sine, cosine] = [fit[model.len()], fit[model.len() + 1]];
-        (Follows::Line(span_s / cycles, cosine.atan2(sine)), score)
-    };
-    let lines = first_of(cycles.map(line).collect());
-    pulses.into_iter().chain(lines).collect()
-}
-
 /// Move the inner number of every effect found to where the likelihood is best, one after the other.
 fn refined(series: &Series, axis: &Axis, model: &mut [Follows], from: usize, beat: &Beat) {
     let span_s = series.t_s[series.t_s.len() - 1] - series.t_s[0];
@@ -416,7 +317,7 @@ fn refined(series: &Series, axis: &Axis, model: &mut [Follows], from: usize, bea
 }
 
 /// Coefficients alone, by least squares.
-fn plain(series: &Series, axis: &Axis, model: &[Follows]) -> Vec<f64> {
+pub(super) fn plain(series: &Series, axis: &Axis, model: &[Follows]) -> Vec<f64> {
     let equation = equation(series, axis, model);
     let design = design(series, &equation);
     let y = DVector::from_row_slice(&equation.values);

@@ -293,6 +293,32 @@ fn a_sensor_that_follows_something_else_has_a_formula_and_no_name() {
     }
 }
 
+/// A push for a while is no step, and an oscillation no noise.
+#[test]
+fn a_push_for_a_while_and_an_oscillation_have_a_formula() {
+    let (mut pushes, mut lines) = (0, 0);
+    for seed in 0..10 {
+        let mut rng = ChaCha12Rng::seed_from_u64(seed);
+        let series = series(&mut rng);
+        let noise = red(&mut rng, 5.0, 0.5);
+        let with = |truth: Follows, size: f64| {
+            let column = equation(&series, &axis(vec![0.0; BLOCKS]), &[truth]).columns.swap_remove(0);
+            let values = column.iter().zip(&noise).map(|(x, n)| size * x + 0.3 * n).collect();
+            search(&series, &axis(values), &[])
+        };
+        let found = with(Follows::Pulse(60_500.0, 40_000.0), 1.5);
+        let near =
+            |from_s: f64, length_s: f64| (from_s - 60_500.0).abs() < 6000.0 && (length_s / 40_000.0 - 1.0).abs() < 0.25;
+        pushes +=
+            usize::from(matches!(found.form, Some((Follows::Pulse(from_s, length_s), ..)) if near(from_s, length_s)));
+        let found = with(Follows::Line(9_300.0, 1.0), 0.4);
+        lines += usize::from(
+            matches!(found.form, Some((Follows::Line(period_s, _), ..)) if (period_s / 9300.0 - 1.0).abs() < 0.05),
+        );
+    }
+    assert!(pushes >= 8 && lines >= 8, "{pushes} pushes, {lines} lines");
+}
+
 /// A sensor beside a reference: what the reference shows is smooth over a few samples and wanders for long.
 fn beside_reference(rng: &mut ChaCha12Rng) -> (Series, Vec<f64>) {
     let series = series(rng);
