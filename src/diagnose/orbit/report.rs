@@ -460,7 +460,7 @@ fn notes(problem: &Problem, arcs: &[ArcAnswer], search: &Search) -> Vec<String> 
     ];
     let masked: usize = problem.arcs.iter().map(|arc| arc.masked).sum();
     if masked > 0 {
-        notes.push(format!("{masked} epochs were missing or unusable and are left out."));
+        notes.push(format!("{masked} positions are left out: they are missing, cannot be read, or are off the orbit through the others."));
     }
     if !problem.left_out.is_empty() {
         notes.push(format!("Left out: {}.", problem.left_out.join("; ")));

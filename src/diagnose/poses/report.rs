@@ -76,8 +76,8 @@ fn effect(case: &MeasuredCase, fit: &Triad, part: Part, score: f64, [was, is]: [
 pub fn answer(case: &MeasuredCase, seen: &Seen) -> Answer {
     let &Seen { poses, far_off, gravity, found, .. } = seen;
     let (first, last) = (&found.fits[0], &found.fits[found.fits.len() - 1]);
-    // What a pose's own readings say of its mean.
-    let floor = rms(&poses.iter().map(|p| p.error).collect::<Vec<f64>>()) * last.usual_scale;
+    // What a pose's own readings say of its mean; those that never change say nothing.
+    let floor = (rms(&poses.iter().map(|p| p.error).collect::<Vec<f64>>()) * last.usual_scale).max(1e-12);
     let remains = seen.remains.as_ref().filter(|r| r.probability <= CLAIM);
     let scatters = scatter_chance(last, poses, floor) <= CLAIM;
     let far = scatters && rms(&last.residuals) > FAR * floor;
