@@ -16,10 +16,9 @@ use crate::math::rms::about_mean;
 use crate::pipeline::calibration::{
     Anomaly, Bias, BiasMeasurement, Calibration, Provenance, bias_law::PARAMETERS, saturation,
 };
-use crate::pipeline::ledger::Ledger;
 use crate::pipeline::station::{Station, replay};
 use crate::pipeline::window::Window;
-use crate::pipeline::{PlaybackId, Product, Settings};
+use crate::pipeline::{Ledger, PlaybackId, Product, Settings};
 use crate::telemetry::{Mode, Quality, Range};
 use crate::units::MissionTime;
 
@@ -138,9 +137,9 @@ fn not_come(ledger: &Ledger) -> Option<String> {
     let gaps = ledger.seconds.gaps();
     if !gaps.is_empty() {
         let missing: i64 = gaps.iter().map(|(from, to)| to - from).sum();
-        said.push(format!("{missing} s in {} gaps have no science record", gaps.len()));
+        said.push(format!("{missing} s have no science record (gaps: {})", gaps.len()));
     }
-    (!said.is_empty()).then(|| format!("of the dump {}", said.join("; ")))
+    (!said.is_empty()).then(|| format!("of what came down {}", said.join("; ")))
 }
 
 impl Taken {
@@ -343,8 +342,24 @@ fn deviation_ng(calibration: &Calibration, window: &Window, product: &Product) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ingest::wire::FrameRefusal;
     use crate::pipeline::Settings;
     use crate::pipeline::calibration::{KnownCalibration, Scale};
+    use crate::units::Clock;
+
+    #[test]
+    fn what_did_not_come_of_a_dump_is_told_and_of_a_whole_one_nothing() {
+        let second = |s: i64| Clock::from_tenths(10 * s);
+        let mut ledger = Ledger::default();
+        (0..100).for_each(|s| ledger.seconds.add(second(s)));
+        assert_eq!(not_come(&ledger), None);
+        (130..150).for_each(|s| ledger.seconds.add(second(s)));
+        let account = &mut ledger.playback_mut(PlaybackId(1)).account;
+        account.frames_found = 40;
+        account.frames_refused.insert(FrameRefusal::Fecf, 3);
+        let told = "of what came down 3 of 40 frames are refused (fecf 3); 30 s have no science record (gaps: 1)";
+        assert_eq!(not_come(&ledger).as_deref(), Some(told));
+    }
 
     #[test]
     fn an_axis_whose_scale_factor_is_not_measured_is_not_calibrated() {

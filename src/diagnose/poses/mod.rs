@@ -142,7 +142,7 @@ impl Triad {
 
     /// |a| - g this model gives for other poses, m/s^2.
     pub fn predict(&self, poses: &[Pose], gravity: f64) -> Vec<f64> {
-        poses.iter().map(|pose| acceleration(&self.parts, &self.unknowns, pose).norm() - gravity).collect()
+        poses.iter().map(|pose| misfit(&self.parts, &self.unknowns, pose, gravity)).collect()
     }
 
     /// Direction of gravity's reaction in the triad in a pose.
@@ -181,6 +181,11 @@ fn acceleration(parts: &[Part], unknowns: &DVector<f64>, pose: &Pose) -> Vector3
     // What the recording has: an axis that reads (1 + k) times the truth is divided by it.
     let a = Vector3::from_fn(|k, _| raw[k] / (1.0 + scale[k]));
     Vector3::new(a.x - angle.x * a.y - angle.y * a.z, a.y - angle.z * a.z, a.z)
+}
+
+/// |a| - g, m/s^2.
+fn misfit(parts: &[Part], unknowns: &DVector<f64>, pose: &Pose, gravity: f64) -> f64 {
+    acceleration(parts, unknowns, pose).norm() - gravity
 }
 
 /// How far a pose's reading is from where gravity has its size, at the usual scale, m/s^2.
@@ -262,8 +267,7 @@ pub fn fit(parts: &[Part], poses: &[Pose], gravity: f64) -> Triad {
     let inverse =
         slopes.tr_mul(&slopes).try_inverse().unwrap_or_else(|| DMatrix::from_diagonal_element(n, n, f64::MAX));
     let scale = solved.unknowns[0].exp();
-    let misfit = |pose: &Pose| acceleration(parts, &solved.unknowns, pose).norm() - gravity;
-    let misfits = poses.iter().map(misfit).collect();
+    let misfits = poses.iter().map(|pose| misfit(parts, &solved.unknowns, pose, gravity)).collect();
     let leverages = slopes.row_iter().map(|row| (row * &inverse * row.transpose())[0]).collect();
     Triad {
         leverages,

@@ -9,11 +9,11 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector, Vector3};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::Triad;
 use super::still::Pose;
+use super::{SPARE_POSES, Triad};
 
-/// Fewest poses beyond the unknowns.
-const SPARE: usize = 4;
+/// Parts of the direction of gravity.
+const NAMES: [&str; 3] = ["dx", "dy", "dz"];
 /// What an axis may fall short of, in gravity: bounds at which it clips, and within which it is dead.
 const BOUNDS: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// Fewest poses to either side of an instant.
@@ -63,7 +63,7 @@ pub fn structure(fit: &Triad, poses: &[Pose]) -> Option<Structure> {
     let asked = forms.len() as f64;
     let tried = |form: &Form| -> Option<(f64, f64, DVector<f64>, DVector<f64>)> {
         let k = form.columns.len();
-        let free = n.checked_sub(unknowns + k + SPARE).map(|spare| (spare + SPARE) as f64)?;
+        let free = n.checked_sub(unknowns + k).filter(|free| *free >= SPARE_POSES)? as f64;
         let raw = DMatrix::from_fn(n, k, |i, j| form.columns[j][i]);
         let columns = beside(raw.clone());
         let own = (0..k).all(|j| columns.column(j).norm() > OWN * raw.column(j).norm());
@@ -99,7 +99,7 @@ fn forms(fit: &Triad, poses: &[Pose]) -> Vec<Form> {
         let columns = vec![(0..poses.len()).map(f).collect()];
         all.push(Form { formula, columns, axes: axes.to_vec(), from_s: None });
     };
-    for (k, name) in ["dx", "dy", "dz"].into_iter().enumerate() {
+    for (k, name) in NAMES.into_iter().enumerate() {
         let x = |i: usize| d[i][k];
         add(format!("{name}^3"), &[k], &|i| x(i).powi(3));
         add(format!("{name}^4"), &[k], &|i| x(i).powi(4));
@@ -118,14 +118,13 @@ fn forms(fit: &Triad, poses: &[Pose]) -> Vec<Form> {
         add(format!("t^2 {name}"), &[k], &|i| t[i].powi(2) * x(i));
         add(format!("t {name}^2"), &[k], &|i| t[i] * x(i).powi(2));
         for j in (0..3).filter(|j| *j != k) {
-            add(format!("{name}^2 {}", ["dx", "dy", "dz"][j]), &[k, j], &|i| x(i).powi(2) * d[i][j]);
+            add(format!("{name}^2 {}", NAMES[j]), &[k, j], &|i| x(i).powi(2) * d[i][j]);
         }
     }
     add("dx dy dz".into(), &[0, 1, 2], &|i| d[i].x * d[i].y * d[i].z);
     add("t".into(), &[0, 1, 2], &|i| t[i]);
     add("t^2".into(), &[0, 1, 2], &|i| t[i].powi(2));
-    for k in 0..3 {
-        let name = ["dx", "dy", "dz"][k];
+    for (k, name) in NAMES.into_iter().enumerate() {
         for from in SIDE..poses.len().saturating_sub(SIDE) {
             let after = |i: usize| if i >= from { d[i][k] } else { 0.0 };
             all.push(Form {

@@ -18,20 +18,11 @@ const IN_TIME: usize = 3;
 /// The instants at which a step is likeliest, each moment between two blocks tried in the noise that the model has without
 /// one; not within a fortieth of either end.
 pub(super) fn likely_steps(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Vec<Follows> {
-    let without = equation(series, axis, model);
-    let (noise, _) = red::best(&without.values, &design(series, &without), beat);
+    let without = in_noise_about(series, axis, model, beat);
     let n = series.t_s.len();
-    let between = |i: usize| 0.5 * (series.t_s[i - 1] + series.t_s[i]);
-    let at = |i: usize| {
-        let mut with = model.to_vec();
-        with.push(Follows::Step(between(i)));
-        let equation = equation(series, axis, &with);
-        (i, red::in_noise(&equation.values, &design(series, &equation), beat, noise))
-    };
     let margin = (n / 40).max(2);
-    let mut tried: Vec<(usize, f64)> = (margin..n - margin).map(at).collect();
-    tried.sort_by(|a, b| b.1.total_cmp(&a.1));
-    tried.iter().take(STEPS).map(|(i, _)| Follows::Step(between(*i))).collect()
+    let step = |i: usize| Follows::Step(0.5 * (series.t_s[i - 1] + series.t_s[i]));
+    likeliest((margin..n - margin).map(step).map(|step| (step, without(&[model, &[step]].concat()))), STEPS)
 }
 
 /// The likeliest delays of every temperature, each multiple of a beat tried: in the noise that the model has without one, and in that which it

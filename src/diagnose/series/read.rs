@@ -128,27 +128,23 @@ pub fn series(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<S
     let all: Vec<&Column> = values.iter().chain(&controls).chain(&references).chain(&covariates).collect();
     let (t_s, mut table, masked) = rows(case, &file, &files[&file], &all, needed + references.len())?;
     // What nobody can read is followed by nothing that could be shown.
-    let readable = |column: &Vec<f64>| 2 * column.iter().filter(|v| v.is_finite()).count() >= column.len();
-    let mut of_covariates = table.split_off(needed + references.len());
-    let is_read: Vec<bool> = of_covariates.iter().map(readable).collect();
-    let names = |wanted: bool| {
-        let some = covariates.iter().zip(&is_read).filter(move |(_, is_read)| **is_read == wanted);
-        some.map(|(column, _)| column.name.clone()).collect::<Vec<String>>()
-    };
-    let (read, unread) = (names(true), names(false));
-    let covariates: Vec<Column> = covariates.into_iter().filter(|column| read.contains(&column.name)).collect();
-    let mut is_read = is_read.into_iter();
-    of_covariates.retain(|_| is_read.next().unwrap_or(false));
-    let mut of_references = table.split_off(needed);
-    table.append(&mut of_covariates);
-    table.append(&mut of_references);
+    let (mut read, mut unread) = (Vec::new(), Vec::new());
+    for (column, values) in covariates.into_iter().zip(table.split_off(needed + references.len())) {
+        if 2 * values.iter().filter(|v| v.is_finite()).count() < values.len() {
+            unread.push(column.name);
+        } else {
+            read.push(column);
+            table.push(values);
+        }
+    }
     let spans = spans(case)?;
     let count = if references.is_empty() { BLOCKS } else { BLOCKS_WITH_REFERENCE };
     let Blocks { t_s, span, mut table, masked: blunders } = blocks(&t_s, &table, &spans, count);
     if t_s.len() < BLOCKS_MIN {
         return Err(MeasuredError::TooFew { what: "blocks of rows", found: t_s.len(), expected: BLOCKS_MIN });
     }
-    let mut references = table.split_off(needed + covariates.len()).into_iter();
+    let of_covariates = table.split_off(needed + references.len());
+    let mut references = table.split_off(needed).into_iter();
     let mut table = table.into_iter();
     let mut axis = |column: Column, control: bool| {
         let mut values = table.next().unwrap_or_default();
@@ -161,9 +157,8 @@ pub fn series(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<S
     };
     let mut axes: Vec<Axis> = values.into_iter().map(|c| axis(c, false)).collect();
     axes.extend(controls.into_iter().map(|c| axis(c, true)));
-    let covariate =
-        |c: Column| CovariateSeries { name: c.name, unit: c.unit, values: table.next().unwrap_or_default() };
-    let covariates = covariates.into_iter().map(covariate).collect();
+    let covariate = |(c, values): (Column, Vec<f64>)| CovariateSeries { name: c.name, unit: c.unit, values };
+    let covariates = read.into_iter().zip(of_covariates).map(covariate).collect();
     // Spans without a row in them have no constant to estimate.
     let mut used: Vec<usize> = span.clone();
     used.dedup();
