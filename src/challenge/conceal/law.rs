@@ -173,15 +173,17 @@ fn echo(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
     shape
 }
 
-/// As long as the event, and of a firing as long as a window sees.
+/// As long as the event, but as a window sees at least and seven minutes at most. Not every flight has firings and dumps; the nights are
+/// always two.
 fn delayed(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
     let delay = between(rng, 500.0, 6000.0);
     let of = |kind: &str| flight.events.iter().filter(|e| e.kind == kind).collect::<Vec<_>>();
-    let kinds: Vec<_> = ["thruster", "evaporator", "water_dump"].map(of).into_iter().filter(|e| e.len() > 2).collect();
+    let all = ["thruster", "evaporator", "water_dump", "crew_sleep"].map(of);
+    let kinds: Vec<_> = all.into_iter().filter(|events| events.len() > 1).collect();
     let mut shape = vec![0.0; flight.times_s.len()];
     for event in pick(rng, &kinds) {
         let from = event.clock_s + delay;
-        let until = from + event.duration_s.max(80.0);
+        let until = from + event.duration_s.clamp(80.0, 420.0);
         for (x, _) in shape.iter_mut().zip(&flight.times_s).filter(|(_, t)| (from..until).contains(*t)) {
             *x = 1.0;
         }
@@ -244,4 +246,27 @@ fn sawtooth(flight: &Flight) -> Vec<f64> {
         ((t - last) / 57_600.0).min(1.5)
     };
     flight.times_s.iter().map(ramp).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::super::{Kind, Manner};
+    use super::*;
+
+    /// In flights without firings or dumps too.
+    #[test]
+    fn every_law_acts_on_every_flight() {
+        for seed in 0..30 {
+            let mut rng = ChaCha12Rng::seed_from_u64(seed);
+            let flight = Flight::draw(&mut rng, Kind::Unknown, Manner::default());
+            let total: Vec<Vector3<f64>> = force::field_t(&flight).iter().map(|b| b * 1e7).collect();
+            for (name, _) in all() {
+                let push = signature(&mut rng, name, &flight, &total);
+                let acts = push.iter().any(|a| a.norm() > 0.0) && push.iter().all(|a| a.norm().is_finite());
+                assert!(acts && push.len() == flight.times_s.len(), "{seed}: {name}");
+            }
+        }
+    }
 }

@@ -9,20 +9,27 @@ use crate::diagnose::earlier::REACH_S;
 
 /// The likeliest instants of a step that are weighed in full.
 const STEPS: usize = 3;
+/// Part of the record at either end in which nothing is taken to begin or end: of that too little is seen.
+const EDGE: usize = 40;
 /// The longest delay tried, as a part of the record: of what is later still too little is left to be predicted.
 const DELAY_MAX: f64 = 0.2;
 /// Places between which a push for a while is looked for, and how many of such, and of oscillations, are weighed in full.
-const EDGES: usize = 40;
+const EDGES: usize = 24;
 const IN_TIME: usize = 3;
 
 /// The instants at which a step is likeliest, each moment between two blocks tried in the noise that the model has without
-/// one; not within a fortieth of either end.
+/// one.
 pub(super) fn likely_steps(series: &Series, axis: &Axis, model: &[Follows], beat: &Beat) -> Vec<Follows> {
     let without = in_noise_about(series, axis, model, beat);
+    let steps = instants(series).map(Follows::Step);
+    likeliest(steps.map(|step| (step, without(&[model, &[step]].concat()))), STEPS)
+}
+
+/// Between two blocks, not near the ends: what begins or ends there is a step, or none.
+fn instants(series: &Series) -> impl Iterator<Item = f64> {
     let n = series.t_s.len();
-    let margin = (n / 40).max(2);
-    let step = |i: usize| Follows::Step(0.5 * (series.t_s[i - 1] + series.t_s[i]));
-    likeliest((margin..n - margin).map(step).map(|step| (step, without(&[model, &[step]].concat()))), STEPS)
+    let margin = (n / EDGE).max(2);
+    (margin..n - margin).map(|i| 0.5 * (series.t_s[i - 1] + series.t_s[i]))
 }
 
 /// The likeliest delays of every temperature, each multiple of a beat tried: in the noise that the model has without one, and in that which it
@@ -83,9 +90,9 @@ pub(super) fn likely_pulses(series: &Series, axis: &Axis, model: &[Follows], bea
         return Vec::new();
     }
     let spacing_s = (t_s[n - 1] - t_s[0]) / EDGES as f64;
-    let between = |i: usize| 0.5 * (t_s[i - 1] + t_s[i]);
-    let edges: Vec<f64> = (1..EDGES).map(|i| between(i * (n - 1) / EDGES + 1)).collect();
-    let near = |at: f64| (1..n).map(between).filter(move |t| (t - at).abs() <= spacing_s);
+    let all: Vec<f64> = instants(series).collect();
+    let edges: Vec<f64> = (0..=EDGES).map(|i| all[i * (all.len() - 1) / EDGES]).collect();
+    let near = |at: f64| all.iter().copied().filter(move |t| (t - at).abs() <= spacing_s);
     let found_in = |in_noise: &dyn Fn(&[Follows]) -> f64| {
         let weighed = |pulse: Follows| (pulse, in_noise(&[model, &[pulse]].concat()));
         let pairs = edges.iter().enumerate().flat_map(|(i, from)| edges[i + 1..].iter().map(move |to| (*from, *to)));
@@ -108,10 +115,8 @@ pub(super) fn likely_pulses(series: &Series, axis: &Axis, model: &[Follows], bea
         let about = [model, &[*first]].concat();
         found_in(&in_noise_about(series, axis, &about, beat))
     });
-    let mut all: Vec<Follows> = again.collect();
-    all.extend(without);
-    all.extend(quiet);
-    all
+    let again: Vec<Follows> = again.collect();
+    [again, without, quiet].concat()
 }
 
 /// The likeliest oscillations, but for those of a day, which a temperature has.
