@@ -165,49 +165,98 @@ struct Whitened {
 }
 
 impl Whitened {
-    /// A Kalman filter whitens values and columns alike.
     fn new(values: &[f64], design: &DMatrix<f64>, beat: &Beat, noise: Noise) -> Option<Self> {
-        const MOST: usize = RUNGS.len();
-        let shares = noise.wander.shares();
-        let m = shares.len();
+        match noise.wander.shares()[..] {
+            [one] => Self::of([one], values, design, beat, noise.white),
+            ref all => Self::of::<{ RUNGS.len() }>(all.try_into().ok()?, values, design, beat, noise.white),
+        }
+    }
+
+    /// A Kalman filter whitens values and columns alike, for processes by their place among the memories and their shares.
+    fn of<const M: usize>(
+        shares: [(usize, f64); M],
+        values: &[f64],
+        design: &DMatrix<f64>,
+        beat: &Beat,
+        white: f64,
+    ) -> Option<Self> {
         let (n, k) = design.shape();
         let mut rows = DMatrix::zeros(n, k);
         let mut y = DVector::zeros(n);
-        let mut state = vec![[0.0_f64; MOST]; k + 1];
-        let mut variance = [[0.0; MOST]; MOST];
-        shares.iter().enumerate().for_each(|(a, (_, share))| variance[a][a] = *share);
+        let mut state = vec![[0.0_f64; M]; k + 1];
+        let mut expects = Expects::new(shares.map(|(_, share)| share), white);
         let mut log_det = 0.0;
         for i in 0..n {
-            let seen: [f64; MOST] = std::array::from_fn(|a| variance[a][..m].iter().sum());
-            let innovation = seen[..m].iter().sum::<f64>() + noise.white;
-            let scale = innovation.sqrt().recip();
-            log_det += innovation.ln();
-            let rho: [f64; MOST] = std::array::from_fn(|a| {
-                shares.get(a).and_then(|(memory, _)| beat.correlations[*memory].get(i).copied()).unwrap_or(0.0)
-            });
+            let rho = shares.map(|(memory, _)| beat.correlations[memory].get(i).copied().unwrap_or(0.0));
+            expects.go_on(rho);
+            log_det += expects.ln_innovation;
             for (j, state) in state.iter_mut().enumerate() {
                 let x = if j < k { design[(i, j)] } else { values[i] };
-                let new = x - state[..m].iter().sum::<f64>();
+                let new = x - state.iter().sum::<f64>();
                 if j < k {
-                    rows[(i, j)] = new * scale;
+                    rows[(i, j)] = new * expects.scale;
                 } else {
-                    y[i] = new * scale;
+                    y[i] = new * expects.scale;
                 }
-                for a in 0..m {
-                    state[a] = rho[a] * (state[a] + seen[a] / innovation * new);
+                for a in 0..M {
+                    state[a] = rho[a] * (state[a] + expects.gain[a] * new);
                 }
-            }
-            for a in 0..m {
-                for b in 0..m {
-                    variance[a][b] = rho[a] * rho[b] * (variance[a][b] - seen[a] * seen[b] / innovation);
-                }
-                variance[a][a] += shares[a].1 * (1.0 - rho[a] * rho[a]);
             }
         }
         let factor = rows.tr_mul(&rows).cholesky()?;
         let left = (&y - &rows * factor.solve(&rows.tr_mul(&y))).norm_squared().max(f64::MIN_POSITIVE);
         let log_det_normal = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.abs().ln()).sum::<f64>();
         Some(Self { left, log_det, log_det_normal })
+    }
+}
+
+/// What the filter expects of a sample, whatever the values are.
+struct Expects<const M: usize> {
+    shares: [f64; M],
+    white: f64,
+    /// Of the processes, before the next sample.
+    variance: [[f64; M]; M],
+    /// Correlations that led there, and whether they change it no more.
+    rho: [f64; M],
+    settled: bool,
+    /// Of each process, as a share of what is new in this sample.
+    gain: [f64; M],
+    /// Over the standard deviation of what is new in this sample, and the logarithm of its variance.
+    scale: f64,
+    ln_innovation: f64,
+}
+
+/// At even times the variances soon change no more: by less than this share of them from one sample to the next.
+const SETTLED: f64 = 1e-12;
+
+impl<const M: usize> Expects<M> {
+    fn new(shares: [f64; M], white: f64) -> Self {
+        let variance = std::array::from_fn(|a| std::array::from_fn(|b| if a == b { shares[a] } else { 0.0 }));
+        let nothing = [0.0; M];
+        Self { shares, white, variance, rho: nothing, settled: false, gain: nothing, scale: 1.0, ln_innovation: 0.0 }
+    }
+
+    /// To the next sample, with so much of every process left at the one after it.
+    fn go_on(&mut self, rho: [f64; M]) {
+        let close = |a: f64, b: f64| (a - b).abs() <= SETTLED * b.abs();
+        if self.settled && rho.iter().zip(&self.rho).all(|(a, b)| close(*a, *b)) {
+            return;
+        }
+        let seen = self.variance.map(|row| row.iter().sum::<f64>());
+        let innovation = seen.iter().sum::<f64>() + self.white;
+        self.gain = seen.map(|seen| seen / innovation);
+        self.scale = innovation.sqrt().recip();
+        self.ln_innovation = innovation.ln();
+        self.settled = true;
+        for a in 0..M {
+            for b in 0..M {
+                let own = if a == b { self.shares[a] * (1.0 - rho[a] * rho[a]) } else { 0.0 };
+                let next = rho[a] * rho[b] * (self.variance[a][b] - self.gain[a] * seen[b]) + own;
+                self.settled &= close(next, self.variance[a][b]);
+                self.variance[a][b] = next;
+            }
+        }
+        self.rho = rho;
     }
 }
 

@@ -1,5 +1,6 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha12Rng;
+use rayon::prelude::*;
 
 use super::follow::{Follows, equation};
 use super::form::Form;
@@ -70,8 +71,7 @@ fn red_noise_follows_nothing_over_many_seeds() {
 }
 
 fn alarms_in_red_noise(seeds: u64) {
-    let mut alarms = Vec::new();
-    for seed in 0..seeds {
+    let alarm = |seed: u64| {
         let mut rng = ChaCha12Rng::seed_from_u64(seed);
         let mut series = series(&mut rng);
         let white = [0.0, 0.3][seed as usize / 5 % 2];
@@ -84,9 +84,10 @@ fn alarms_in_red_noise(seeds: u64) {
             series.covariates.push(covariate(name, unit, red(&mut rng, memory, 0.1)));
         }
         let found = search(&series, &axis(values), &[]);
-        alarms.extend(found.effects.into_iter().map(|(effect, score)| (seed, memory, effect, score)));
-        alarms.extend(found.form.map(|(form, score, _)| (seed, memory, form, score)));
-    }
+        (!found.effects.is_empty() || found.form.is_some())
+            .then(|| format!("{seed}, memory {memory:?}: {:?} {:?}", found.effects, found.form))
+    };
+    let alarms: Vec<String> = (0..seeds).into_par_iter().filter_map(alarm).collect();
     println!("{} false alarms in {seeds}: {alarms:?}", alarms.len());
     assert!(alarms.len() as u64 <= seeds / 100, "{alarms:?}");
 }
