@@ -1,4 +1,4 @@
-//! Leaks that are not as usual: one that opens twice, and one that takes days.
+//! Leaks that are not as usual: one that opens twice, one that takes days, and what is none because it ends.
 
 use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
@@ -10,19 +10,48 @@ struct Leak(f64, [f64; 3], f64);
 
 /// A record of so many hours in which nothing is missing but these.
 fn beside(hours: u32, seed: u64, leaks: &[Leak]) -> Diagnosis {
+    pushed(hours, seed, |t, [first, last]| {
+        let of = |Leak(onset, a_ng, tau_s): &Leak| {
+            let since_s = t - (first + onset * (last - first));
+            a_ng.map(|a| if since_s > 0.0 { a * (-since_s / tau_s).exp() } else { 0.0 })
+        };
+        leaks.iter().map(of).fold([0.0; 3], |sum, a| std::array::from_fn(|k| sum[k] + a[k]))
+    })
+}
+
+/// The same with a push, ng, at an instant of a record from one to another.
+fn pushed(hours: u32, seed: u64, push: impl Fn(f64, [f64; 2]) -> [f64; 3]) -> Diagnosis {
     let manner = Manner { hours, ..Manner::default() };
     let concealed = draw_order(&Order { kind: Kind::Clean, seed, only: None, manner });
     let mut case: Case = super::case(&concealed.files);
     let clock_s = case.recording.clock_s.clone();
-    let (first, last) = (clock_s[0], clock_s[clock_s.len() - 1]);
-    for Leak(onset, a_ng, tau_s) in leaks {
-        let onset_s = first + onset * (last - first);
-        for (series, a_ng) in case.recording.a_ng.iter_mut().zip(a_ng) {
-            let later = series.iter_mut().zip(&clock_s).filter(|(_, t)| **t > onset_s);
-            later.for_each(|(value, t)| *value += a_ng * (-(t - onset_s) / tau_s).exp());
-        }
+    let span_s = [clock_s[0], clock_s[clock_s.len() - 1]];
+    for (axis, series) in case.recording.a_ng.iter_mut().enumerate() {
+        series.iter_mut().zip(&clock_s).for_each(|(value, t)| *value += push(*t, span_s)[axis]);
     }
     diagnose(&case, &Settings::default()).unwrap()
+}
+
+/// What ends, or grows, is near enough to a leak to be taken for one; it is no leak, and when it was there is told.
+#[test]
+fn a_push_that_ends_is_no_leak() {
+    type Course = (&'static str, fn(f64) -> f64, f64);
+    let courses: [Course; 3] = [
+        ("a constant push", |_| 1.0, 1500.0),
+        ("a push that grows from nothing", |x| x, 4000.0),
+        ("a push that rises and falls as half a sine", |x| (std::f64::consts::PI * x).sin(), 5000.0),
+    ];
+    for (said, course, length_s) in courses {
+        let found = pushed(24, 1_250_025, |t, [first, last]| {
+            let x = (t - (first + 0.6 * (last - first))) / length_s;
+            [70.0, -140.0, 95.0].map(|a| if (0.0..1.0).contains(&x) { 1.6 * a * course(x) } else { 0.0 })
+        });
+        assert_eq!(found.verdict, Verdict::Unexplained, "{said}: {:?}", super::ids(&found));
+        let hypothesis = found.hypothesis.unwrap();
+        assert!(hypothesis.formula.contains(said), "{said}: {hypothesis:?}");
+        let told = &found.located.intervals[0];
+        assert!(((told.end_s - told.start_s) / length_s - 1.0).abs() < 0.2, "{said}: {told:?}");
+    }
 }
 
 /// The catalogue's leak begins once: where it begins twice one of both is not all there is, and where the other is, is told.

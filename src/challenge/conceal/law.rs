@@ -30,12 +30,13 @@ pub const LAWS: [(&str, &str); 16] = [
 ];
 
 /// Laws that are there by name only: what is drawn stays what it was.
-const LAWS_BY_NAME: [(&str, &str); 5] = [
+const LAWS_BY_NAME: [(&str, &str); 6] = [
     ("unknown_ringing", "a damped oscillation after every change of attitude"),
     ("unknown_packet", "an oscillation that swells and fades once"),
     ("unknown_slow_chirp", "a slow oscillation of drifting period"),
     ("unknown_delayed", "a push of minutes some time after every logged event"),
     ("unknown_clock", "a ramp that starts again at even distances of its own"),
+    ("unknown_push", "one push that ends"),
 ];
 
 /// Name and plain statement of every law.
@@ -95,6 +96,7 @@ pub fn signature(rng: &mut ChaCha12Rng, name: &str, flight: &Flight, total: &[Ve
         "unknown_packet" => along(packet(rng, flight), fixed),
         "unknown_delayed" => along(delayed(rng, flight), fixed),
         "unknown_clock" => along(clock(rng, flight), fixed),
+        "unknown_push" => along(one_push(rng, flight), fixed),
         "unknown_telegraph" => along(telegraph(rng, n), fixed),
         "unknown_density_temperature" => {
             let density = force::density(flight, force::WHOLE_AIR);
@@ -189,6 +191,16 @@ fn delayed(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
         }
     }
     shape
+}
+
+/// For minutes to hours: all at once, in a ramp up or down, or with its rise and its fall a fifth of its length each.
+fn one_push(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
+    let length = log_between(rng, 300.0, 15_000.0);
+    let from = flight.start_s + (flight.length_s - length) * between(rng, 0.1, 0.9);
+    let courses: [fn(f64) -> f64; 4] = [|_| 1.0, |x| x, |x| 1.0 - x, |x| (5.0 * x.min(1.0 - x)).min(1.0)];
+    let course = pick(rng, &courses);
+    let at = |t: &f64| (t - from) / length;
+    flight.times_s.iter().map(at).map(|x| if (0.0..1.0).contains(&x) { course(x) } else { 0.0 }).collect()
 }
 
 /// Four times in the record at least.

@@ -2,6 +2,7 @@
 //! it says of a decision is in the files beside it.
 
 mod again;
+mod another_course;
 mod claims;
 mod credible;
 mod faults;
@@ -18,6 +19,7 @@ mod stands;
 mod unnamed;
 
 use self::again::again;
+use self::another_course::another_course;
 use self::claims::{of_claims, of_unknown_claims, of_unknown_keys};
 use self::credible::credible;
 use self::fit::fit;
@@ -68,6 +70,10 @@ const AGAIN_SHARE: f64 = 0.1;
 /// Prior sizes are for weighing hypotheses. In what is told of a size they are so many times the usual, or they would draw one that is
 /// several times the usual towards it by a standard error; and bound only what the record cannot say at all.
 const TOLD: f64 = 3.0;
+
+/// What remains, to what is fitted.
+const BESIDE: &str = "It remains beside";
+const INSTEAD: &str = "It takes the place of the leak in";
 
 /// Log evidence lost to noise that is not white, from which on it is told: so much, and such a share of all.
 const TOLD_OF_COLOUR: f64 = 1.0;
@@ -180,7 +186,8 @@ struct Findings<'a> {
     listed: Vec<&'a Weighed>,
     open_wins: bool,
     failure: Option<String>,
-    remains: Option<Remains>,
+    /// And what it is to the best set.
+    remains: Option<(Remains, &'static str)>,
     tried: Tried,
 }
 
@@ -190,7 +197,7 @@ impl Findings<'_> {
         let Self { scene, library, solution, .. } = self;
         let frame = solution.null.frame(scene);
         answer.located = unclaimed(scene, library, &frame, solution, answer.located);
-        if let Some(r) = self.remains {
+        if let Some((r, _)) = self.remains {
             answer.located = of_what_remains(scene, &frame, &r, answer.located);
             answer.hypothesis = Some(of_remains(&r, ""));
         }
@@ -226,14 +233,16 @@ impl Findings<'_> {
         }
         if answer.verdict == Verdict::Unexplained {
             let best_ids = ids(library, &best.set).join(" + ");
-            match (self.failure, self.remains) {
-                (Some(failure), _) => answer.notes.push(of_failure(&best_ids, &failure)),
-                (None, Some(r)) => {
+            let failed = self.failure.is_some();
+            answer.notes.extend(self.failure.map(|failure| of_failure(&best_ids, &failure)));
+            match self.remains {
+                Some((r, place)) if !failed || place == INSTEAD => {
                     answer.located = of_what_remains(scene, &best.frame, &r, answer.located);
-                    answer.hypothesis = Some(of_remains(&r, &format!(" It remains beside {best_ids}.")));
+                    answer.hypothesis = Some(of_remains(&r, &format!(" {place} {best_ids}.")));
                 }
-                (None, None) if self.open_wins => answer.hypothesis = Some(hypothesis(library, &best, &self.listed)),
-                (None, None) => {
+                _ if failed => {}
+                _ if self.open_wins => answer.hypothesis = Some(hypothesis(library, &best, &self.listed)),
+                _ => {
                     let near = near_fail(library, &best, &self.listed);
                     answer.notes.push(format!("No set of listed effects can be believed. {near}").trim_end().into());
                 }
@@ -297,7 +306,7 @@ fn with_remains(
     solution: &Solution,
     (verdict, chosen): (Verdict, Option<&Weighed>),
     proof: Proof,
-) -> (Verdict, f64, Option<Remains>) {
+) -> (Verdict, f64, Option<(Remains, &'static str)>) {
     let weighed = chosen.unwrap_or(&solution.null);
     let left = weighed.left(scene, &library.entries);
     let chances =
@@ -318,13 +327,15 @@ fn with_remains(
         again.map(lessened).map(chances(again_share)),
     ];
     let remains = asked.into_iter().flatten().min_by(|a, b| a.probability.total_cmp(&b.probability));
+    let instead = chosen.and_then(|weighed| another_course(scene, library, weighed));
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
     let rarer = if named { REMAINS_BESIDE } else { 1.0 };
     let allowed = rarer * (1.0 - EVIDENCE_SHARE) * proof.claim;
     let share = if verdict == Verdict::Unexplained { 1.0 } else { REMAINS_SHARE };
     let probability = remains.as_ref().map_or(1.0, |r| r.probability);
     match remains.filter(|r| r.probability <= allowed && r.energy > share * explained) {
-        Some(told) => (Verdict::Unexplained, probability, Some(told)),
+        Some(told) => (Verdict::Unexplained, probability, Some((told, BESIDE))),
+        None if instead.is_some() => (Verdict::Unexplained, 1.0, instead.map(|told| (told, INSTEAD))),
         // What is too little to overturn an explanation says nothing against it.
         None if verdict == Verdict::Explained => (verdict, 1.0, None),
         None => (verdict, probability, None),

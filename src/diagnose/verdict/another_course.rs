@@ -1,0 +1,170 @@
+//! Does a leak that is named die away as one? A push that ends, or grows until it does, is no leak, and is often near enough to one to be
+//! taken for it. Each is weighed in the leak's place, with as many parameters and the same sizes expected.
+
+use crate::diagnose::answer::Interval;
+use crate::diagnose::case::HALF_WINDOW_S;
+use crate::diagnose::design::{Column, Frame};
+use crate::diagnose::model::entry_columns;
+use crate::diagnose::remains::{self, Remains};
+use crate::diagnose::scene::Scene;
+use crate::diagnose::search::{Set, Weighed};
+use crate::diagnose::solve::Library;
+
+/// Log odds of another course against a leak from which on there is none: of leaks, one in some hundreds is so unlike one.
+const ODDS: f64 = 6.0;
+/// Lengths tried first, in time constants of the leak, and how far before its onset they begin, in lengths.
+const LENGTHS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+const BEFORE: [f64; 3] = [0.0, 0.4, 0.8];
+/// Shortest and longest step of the refinement, in lengths.
+const STEPS: [f64; 2] = [0.02, 0.3];
+/// Shortest push, s: a window.
+const SHORTEST_S: f64 = 2.0 * HALF_WINDOW_S;
+
+/// A push from one instant to another.
+struct Course {
+    said: &'static str,
+    /// How much of it is over at a share of its length.
+    over: fn(f64) -> f64,
+}
+
+const COURSES: [Course; 4] = [
+    Course { said: "a constant push", over: |x| x },
+    Course { said: "a push that grows from nothing", over: |x| x * x },
+    Course { said: "a push that falls evenly to nothing", over: |x| x * (2.0 - x) },
+    Course {
+        said: "a push that rises and falls as half a sine",
+        over: |x| 0.5 - 0.5 * (std::f64::consts::PI * x).cos(),
+    },
+];
+
+/// When a push is there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Span {
+    start_s: f64,
+    length_s: f64,
+}
+
+impl Course {
+    /// Its mean over each window, of unit mean over its length.
+    fn series(&self, clock_s: &[f64], span: Span) -> Vec<f64> {
+        let over = |t: f64| (self.over)(((t - span.start_s) / span.length_s).clamp(0.0, 1.0));
+        let inside = |t: &f64| over(t + HALF_WINDOW_S) - over(t - HALF_WINDOW_S);
+        clock_s.iter().map(|t| inside(t) * span.length_s / (2.0 * HALF_WINDOW_S)).collect()
+    }
+}
+
+/// What a leak that is named is more likely than a leak, as what is there in its place.
+pub fn another_course(scene: &Scene, library: &Library, weighed: &Weighed) -> Option<Remains> {
+    let (frame, set) = weighed.framed(scene, &library.entries);
+    let leaks = (0..set.members.len()).filter(|i| {
+        let effect = library.entries[set.members[*i].entry].effect();
+        effect.is_some_and(|effect| effect.id == "vent_leak")
+    });
+    let better = leaks.filter_map(|i| in_place_of(scene, library, &frame, &set, i));
+    better.max_by(|a, b| a.energy.total_cmp(&b.energy))
+}
+
+fn in_place_of(scene: &Scene, library: &Library, frame: &Frame, set: &Set, i: usize) -> Option<Remains> {
+    let clock_s = scene.clock_s();
+    let [first_s, last_s] = [*clock_s.first()?, *clock_s.last()?];
+    let leak = &set.members[i];
+    let entry = &library.entries[leak.entry];
+    let sizes = leak.sizes(&library.entries);
+    let others = set.without(i);
+    let beside = others.chosen(frame);
+    let sized = |column: (&crate::diagnose::design::Raw, &f64)| frame.column(column.0, *column.1);
+    let as_leak: Vec<Column> = entry_columns(scene, entry, &leak.theta)?.iter().zip(&sizes).map(sized).collect();
+    let of_leak = beside.gain(&as_leak);
+    let columns = |course: &Course, span: Span| -> Vec<Column> {
+        let series = course.series(clock_s, span);
+        sizes.iter().enumerate().map(|(axis, size)| frame.scalar(axis, &series, *size)).collect()
+    };
+    let gain = |course: &Course, span: Span| {
+        let inside = span.length_s >= SHORTEST_S && span.start_s >= first_s && span.start_s + span.length_s <= last_s;
+        if inside { beside.gain(&columns(course, span)) } else { f64::NEG_INFINITY }
+    };
+    let [onset_s, tau_s] = [leak.theta[0], leak.theta[1].exp()];
+    let best_of = |course: &'static Course| {
+        let first = LENGTHS.iter().flat_map(|length| {
+            let length_s = length * tau_s;
+            BEFORE.map(|before| Span { start_s: onset_s - before * length_s, length_s })
+        });
+        let (span, gained) = refined(first, |span| gain(course, span))?;
+        Some((course, span, gained))
+    };
+    let (course, span, gained) = COURSES.iter().filter_map(best_of).max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let log_odds = gained - of_leak - (COURSES.len() as f64).ln();
+    (log_odds > ODDS).then(|| {
+        let (mean, _) = beside.normal(&columns(course, span)).posterior();
+        let ng: [f64; 3] = std::array::from_fn(|axis| mean[axis] * sizes[axis]);
+        let axes = remains::sharing(ng);
+        let end_s = span.start_s + span.length_s;
+        let when = format!("from {:.0} s to {end_s:.0} s", span.start_s);
+        Remains {
+            probability: (-log_odds).exp(),
+            energy: 2.0 * gained,
+            form: format!(
+                "[{:.0}, {:.0}, {:.0}] ng on the mean x ({} {when}, else 0)",
+                ng[0], ng[1], ng[2], course.said
+            ),
+            axis: axes.join(", "),
+            axes,
+            location: format!(
+                "{when}: it ends where a leak would die away, and has log odds of {log_odds:.1} against one"
+            ),
+            intervals: vec![Interval { start_s: span.start_s, end_s, why: course.said.into() }],
+            period_s: None,
+        }
+    })
+}
+
+/// The best of some spans, and then of those around it, nearer and nearer.
+fn refined(first: impl Iterator<Item = Span>, gain: impl Fn(Span) -> f64) -> Option<(Span, f64)> {
+    let of = |span: Span| (span, gain(span));
+    let better = |a: &(Span, f64), b: &(Span, f64)| a.1.total_cmp(&b.1);
+    let mut best = first.map(of).max_by(better)?;
+    let mut step = STEPS[1];
+    while step > STEPS[0] {
+        let Span { start_s, length_s } = best.0;
+        let by = step * length_s;
+        let around = [(-by, 0.0), (by, 0.0), (0.0, -by), (0.0, by), (-by, by), (by, -by)];
+        let next = around.map(|(later, longer)| of(Span { start_s: start_s + later, length_s: length_s + longer }));
+        match next.into_iter().max_by(better) {
+            Some(next) if next.1 > best.1 => best = next,
+            _ => step *= 0.5,
+        }
+    }
+    Some(best)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_course_is_its_mean_over_each_window() {
+        let span = Span { start_s: 112.0, length_s: 331.0 };
+        let clock_s: Vec<f64> = (0..40).map(|i| 25.0 * f64::from(i)).collect();
+        let at: [fn(f64) -> f64; 3] =
+            [|_| 1.0, |x| 2.0 * x, |x| 0.5 * std::f64::consts::PI * (std::f64::consts::PI * x).sin()];
+        for (course, at) in COURSES.iter().zip(at) {
+            let series = course.series(&clock_s, span);
+            for (t, mean) in clock_s.iter().zip(series) {
+                let shares = (0..5000).map(|i| (t - 25.0 + 0.01 * (f64::from(i) + 0.5) - span.start_s) / span.length_s);
+                let points = shares.filter(|x| (0.0..1.0).contains(x)).map(at).sum::<f64>() / 5000.0;
+                assert!((points - mean).abs() < 1e-3, "{} at {t}: {points} {mean}", course.said);
+            }
+        }
+    }
+
+    #[test]
+    fn the_best_span_is_come_near_to() {
+        let gain = |span: Span| -((span.start_s - 130.0) / 20.0).powi(2) - ((span.length_s - 700.0) / 40.0).powi(2);
+        let first = [300.0, 600.0].map(|length_s| Span { start_s: 0.0, length_s });
+        let (span, gained) = refined(first.into_iter(), gain).unwrap();
+        assert!(
+            (span.start_s - 130.0).abs() < 20.0 && (span.length_s - 700.0).abs() < 20.0 && gained > -1.0,
+            "{span:?}"
+        );
+    }
+}
