@@ -3,15 +3,17 @@
 
 use crate::diagnose::answer::Interval;
 use crate::diagnose::case::HALF_WINDOW_S;
-use crate::diagnose::design::{Column, Frame};
+use crate::diagnose::design::{Column, Frame, Raw};
 use crate::diagnose::model::entry_columns;
 use crate::diagnose::remains::{self, Remains};
 use crate::diagnose::scene::Scene;
 use crate::diagnose::search::{Set, Weighed};
 use crate::diagnose::solve::Library;
 
-/// Log odds of another course against a leak from which on there is none: of leaks, one in some hundreds is so unlike one.
+/// Log odds of another course against a leak from which on there is no leak: of leaks, one in some hundreds is so unlike one. And from which on
+/// it is told that there may be none.
 const ODDS: f64 = 6.0;
+const DOUBT: f64 = 0.0;
 /// Lengths tried first, in time constants of the leak, and how far before its onset they begin, in lengths.
 const LENGTHS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 const BEFORE: [f64; 3] = [0.0, 0.4, 0.8];
@@ -53,18 +55,36 @@ impl Course {
     }
 }
 
-/// What a leak that is named is more likely than a leak, as what is there in its place.
-pub fn another_course(scene: &Scene, library: &Library, weighed: &Weighed) -> Option<Remains> {
+/// What is likelier than a leak that is named.
+pub enum AnotherCourse {
+    /// Beyond doubt: what is there in its place.
+    Instead(Remains),
+    /// Not so, as a note.
+    Maybe(String),
+}
+
+/// What is likelier than a leak that is named, of several the likeliest.
+pub fn another_course(scene: &Scene, library: &Library, weighed: &Weighed) -> Option<AnotherCourse> {
     let (frame, set) = weighed.framed(scene, &library.entries);
     let leaks = (0..set.members.len()).filter(|i| {
         let effect = library.entries[set.members[*i].entry].effect();
         effect.is_some_and(|effect| effect.id == "vent_leak")
     });
-    let better = leaks.filter_map(|i| in_place_of(scene, library, &frame, &set, i));
-    better.max_by(|a, b| a.energy.total_cmp(&b.energy))
+    let others = leaks.filter_map(|i| in_place_of(scene, library, &frame, &set, i));
+    let (log_odds, other) = others.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    if log_odds > ODDS {
+        return Some(AnotherCourse::Instead(other));
+    }
+    (log_odds > DOUBT).then(|| {
+        AnotherCourse::Maybe(format!(
+            "vent_leak: that it dies away, as the catalogue's does, the record does not show: {} has log odds of {log_odds:.1} against it",
+            other.form
+        ))
+    })
 }
 
-fn in_place_of(scene: &Scene, library: &Library, frame: &Frame, set: &Set, i: usize) -> Option<Remains> {
+/// The likeliest other course of one leak, and its log odds against it.
+fn in_place_of(scene: &Scene, library: &Library, frame: &Frame, set: &Set, i: usize) -> Option<(f64, Remains)> {
     let clock_s = scene.clock_s();
     let [first_s, last_s] = [*clock_s.first()?, *clock_s.last()?];
     let leak = &set.members[i];
@@ -72,7 +92,7 @@ fn in_place_of(scene: &Scene, library: &Library, frame: &Frame, set: &Set, i: us
     let sizes = leak.sizes(&library.entries);
     let others = set.without(i);
     let beside = others.chosen(frame);
-    let sized = |column: (&crate::diagnose::design::Raw, &f64)| frame.column(column.0, *column.1);
+    let sized = |column: (&Raw, &f64)| frame.column(column.0, *column.1);
     let as_leak: Vec<Column> = entry_columns(scene, entry, &leak.theta)?.iter().zip(&sizes).map(sized).collect();
     let of_leak = beside.gain(&as_leak);
     let columns = |course: &Course, span: Span| -> Vec<Column> {
@@ -94,28 +114,22 @@ fn in_place_of(scene: &Scene, library: &Library, frame: &Frame, set: &Set, i: us
     };
     let (course, span, gained) = COURSES.iter().filter_map(best_of).max_by(|a, b| a.2.total_cmp(&b.2))?;
     let log_odds = gained - of_leak - (COURSES.len() as f64).ln();
-    (log_odds > ODDS).then(|| {
-        let (mean, _) = beside.normal(&columns(course, span)).posterior();
-        let ng: [f64; 3] = std::array::from_fn(|axis| mean[axis] * sizes[axis]);
-        let axes = remains::sharing(ng);
-        let end_s = span.start_s + span.length_s;
-        let when = format!("from {:.0} s to {end_s:.0} s", span.start_s);
-        Remains {
-            probability: (-log_odds).exp(),
-            energy: 2.0 * gained,
-            form: format!(
-                "[{:.0}, {:.0}, {:.0}] ng on the mean x ({} {when}, else 0)",
-                ng[0], ng[1], ng[2], course.said
-            ),
-            axis: axes.join(", "),
-            axes,
-            location: format!(
-                "{when}: it ends where a leak would die away, and has log odds of {log_odds:.1} against one"
-            ),
-            intervals: vec![Interval { start_s: span.start_s, end_s, why: course.said.into() }],
-            period_s: None,
-        }
-    })
+    let (mean, _) = beside.normal(&columns(course, span)).posterior();
+    let ng: [f64; 3] = std::array::from_fn(|axis| mean[axis] * sizes[axis]);
+    let axes = remains::sharing(ng);
+    let end_s = span.start_s + span.length_s;
+    let when = format!("from {:.0} s to {end_s:.0} s", span.start_s);
+    let other = Remains {
+        probability: (-log_odds).exp().min(1.0),
+        energy: 2.0 * gained,
+        form: format!("[{:.0}, {:.0}, {:.0}] ng on the mean x ({} {when}, else 0)", ng[0], ng[1], ng[2], course.said),
+        axis: axes.join(", "),
+        axes,
+        location: format!("{when}: it ends where a leak would die away, and has log odds of {log_odds:.1} against one"),
+        intervals: vec![Interval { start_s: span.start_s, end_s, why: course.said.into() }],
+        period_s: None,
+    };
+    Some((log_odds, other))
 }
 
 /// The best of some spans, and then of those around it, nearer and nearer.
@@ -145,8 +159,8 @@ mod tests {
     fn every_course_is_its_mean_over_each_window() {
         let span = Span { start_s: 112.0, length_s: 331.0 };
         let clock_s: Vec<f64> = (0..40).map(|i| 25.0 * f64::from(i)).collect();
-        let at: [fn(f64) -> f64; 3] =
-            [|_| 1.0, |x| 2.0 * x, |x| 0.5 * std::f64::consts::PI * (std::f64::consts::PI * x).sin()];
+        let sine = |x: f64| 0.5 * std::f64::consts::PI * (std::f64::consts::PI * x).sin();
+        let at: [fn(f64) -> f64; COURSES.len()] = [|_| 1.0, |x| 2.0 * x, |x| 2.0 - 2.0 * x, sine];
         for (course, at) in COURSES.iter().zip(at) {
             let series = course.series(&clock_s, span);
             for (t, mean) in clock_s.iter().zip(series) {

@@ -19,7 +19,7 @@ mod stands;
 mod unnamed;
 
 use self::again::again;
-use self::another_course::another_course;
+use self::another_course::{AnotherCourse, another_course};
 use self::claims::{of_claims, of_unknown_claims, of_unknown_keys};
 use self::credible::credible;
 use self::fit::fit;
@@ -155,7 +155,9 @@ fn of_the_mismatch(
     if judged.verdict != Verdict::Unexplained || chosen.is_none() {
         notes.extend(failure.clone());
     }
-    let (verdict, least, remains) = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
+    let overturned = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
+    let Overturned { verdict, probability: least, remains, doubt } = overturned;
+    notes.extend(doubt);
     let tried = judged.on_trial.map_or_else(|| tried(scene, library, &solution.null), |(_, tried)| tried);
     let (of_evidence, by_remains) = (proof.probability / EVIDENCE_SHARE, least / (1.0 - EVIDENCE_SHARE));
     let overall = of_evidence.min(by_remains).clamp(LEAST_PROBABILITY, 1.0);
@@ -298,15 +300,25 @@ fn of_assumptions(scene: &Scene, library: &Library, set: &Set) -> Vec<String> {
     set.members.iter().enumerate().filter_map(assumed).collect()
 }
 
-/// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains. The verdict, how
-/// probable what remains is, and what remains where that is what is to be told: beside a formula, where it is more than that explains.
+/// A verdict when what remains was asked.
+struct Overturned {
+    verdict: Verdict,
+    /// How probable what remains is.
+    probability: f64,
+    /// What remains where that is what is to be told, beside a formula where it is more than that explains; and what it is to the best set.
+    remains: Option<(Remains, &'static str)>,
+    /// What is not enough to overturn an explanation, as a note.
+    doubt: Option<String>,
+}
+
+/// Asks what remains, and lets it overturn the verdict: what an explanation leaves must be small beside what it explains.
 fn with_remains(
     scene: &Scene,
     library: &Library,
     solution: &Solution,
     (verdict, chosen): (Verdict, Option<&Weighed>),
     proof: Proof,
-) -> (Verdict, f64, Option<(Remains, &'static str)>) {
+) -> Overturned {
     let weighed = chosen.unwrap_or(&solution.null);
     let left = weighed.left(scene, &library.entries);
     let chances =
@@ -327,18 +339,23 @@ fn with_remains(
         again.map(lessened).map(chances(again_share)),
     ];
     let remains = asked.into_iter().flatten().min_by(|a, b| a.probability.total_cmp(&b.probability));
-    let instead = chosen.and_then(|weighed| another_course(scene, library, weighed));
+    let (instead, doubt) = match chosen.and_then(|weighed| another_course(scene, library, weighed)) {
+        Some(AnotherCourse::Instead(told)) => (Some((told, INSTEAD)), None),
+        Some(AnotherCourse::Maybe(note)) => (None, Some(note)),
+        None => (None, None),
+    };
     let explained = 2.0 * (weighed.log_posterior - solution.null.log_posterior);
     let rarer = if named { REMAINS_BESIDE } else { 1.0 };
     let allowed = rarer * (1.0 - EVIDENCE_SHARE) * proof.claim;
     let share = if verdict == Verdict::Unexplained { 1.0 } else { REMAINS_SHARE };
     let probability = remains.as_ref().map_or(1.0, |r| r.probability);
+    let told = |verdict, probability, remains| Overturned { verdict, probability, remains, doubt: None };
     match remains.filter(|r| r.probability <= allowed && r.energy > share * explained) {
-        Some(told) => (Verdict::Unexplained, probability, Some((told, BESIDE))),
-        None if instead.is_some() => (Verdict::Unexplained, 1.0, instead.map(|told| (told, INSTEAD))),
+        Some(remains) => told(Verdict::Unexplained, probability, Some((remains, BESIDE))),
+        None if instead.is_some() => told(Verdict::Unexplained, 1.0, instead),
         // What is too little to overturn an explanation says nothing against it.
-        None if verdict == Verdict::Explained => (verdict, 1.0, None),
-        None => (verdict, probability, None),
+        None if named => Overturned { doubt, ..told(verdict, 1.0, None) },
+        None => told(verdict, probability, None),
     }
 }
 
