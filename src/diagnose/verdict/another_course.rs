@@ -5,6 +5,7 @@ use crate::diagnose::answer::Interval;
 use crate::diagnose::case::HALF_WINDOW_S;
 use crate::diagnose::design::{Column, Frame, Raw};
 use crate::diagnose::model::entry_columns;
+use crate::diagnose::optimise::nelder_mead;
 use crate::diagnose::remains::{self, Remains};
 use crate::diagnose::scene::Scene;
 use crate::diagnose::search::{Set, Weighed};
@@ -17,8 +18,9 @@ const DOUBT: f64 = 0.0;
 /// Lengths tried first, in time constants of the leak, and how far before its onset they begin, in lengths.
 const LENGTHS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 const BEFORE: [f64; 3] = [0.0, 0.4, 0.8];
-/// Shortest and longest step of the refinement, in lengths.
-const STEPS: [f64; 2] = [0.02, 0.3];
+/// First steps downhill from the best of these, in lengths, and how many: start and length are then known far better than a window.
+const STEP: f64 = 0.3;
+const EVALUATIONS: usize = 80;
 /// Shortest push, s: a window.
 const SHORTEST_S: f64 = 2.0 * HALF_WINDOW_S;
 
@@ -132,23 +134,13 @@ fn in_place_of(scene: &Scene, library: &Library, frame: &Frame, set: &Set, i: us
     Some((log_odds, other))
 }
 
-/// The best of some spans, and then of those around it, nearer and nearer.
+/// The best of some spans, and then downhill from it.
 fn refined(first: impl Iterator<Item = Span>, gain: impl Fn(Span) -> f64) -> Option<(Span, f64)> {
-    let of = |span: Span| (span, gain(span));
-    let better = |a: &(Span, f64), b: &(Span, f64)| a.1.total_cmp(&b.1);
-    let mut best = first.map(of).max_by(better)?;
-    let mut step = STEPS[1];
-    while step > STEPS[0] {
-        let Span { start_s, length_s } = best.0;
-        let by = step * length_s;
-        let around = [(-by, 0.0), (by, 0.0), (0.0, -by), (0.0, by), (-by, by), (by, -by)];
-        let next = around.map(|(later, longer)| of(Span { start_s: start_s + later, length_s: length_s + longer }));
-        match next.into_iter().max_by(better) {
-            Some(next) if next.1 > best.1 => best = next,
-            _ => step *= 0.5,
-        }
-    }
-    Some(best)
+    let (start, _) = first.map(|span| (span, gain(span))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let of = |at: &[f64]| Span { start_s: at[0], length_s: at[1] };
+    let width = STEP * start.length_s;
+    let best = of(&nelder_mead(&[start.start_s, start.length_s], &[width, width], EVALUATIONS, |at| -gain(of(at))));
+    Some((best, gain(best)))
 }
 
 #[cfg(test)]

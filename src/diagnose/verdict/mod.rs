@@ -71,9 +71,21 @@ const AGAIN_SHARE: f64 = 0.1;
 /// several times the usual towards it by a standard error; and bound only what the record cannot say at all.
 const TOLD: f64 = 3.0;
 
-/// What remains, to what is fitted.
-const BESIDE: &str = "It remains beside";
-const INSTEAD: &str = "It takes the place of the leak in";
+/// Where what remains is to what is fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Place {
+    Beside,
+    InsteadOfALeak,
+}
+
+impl Place {
+    fn said(self) -> &'static str {
+        match self {
+            Self::Beside => "It remains beside",
+            Self::InsteadOfALeak => "It takes the place of the leak in",
+        }
+    }
+}
 
 /// Log evidence lost to noise that is not white, from which on it is told: so much, and such a share of all.
 const TOLD_OF_COLOUR: f64 = 1.0;
@@ -189,7 +201,7 @@ struct Findings<'a> {
     open_wins: bool,
     failure: Option<String>,
     /// And what it is to the best set.
-    remains: Option<(Remains, &'static str)>,
+    remains: Option<(Remains, Place)>,
     tried: Tried,
 }
 
@@ -238,9 +250,9 @@ impl Findings<'_> {
             let failed = self.failure.is_some();
             answer.notes.extend(self.failure.map(|failure| of_failure(&best_ids, &failure)));
             match self.remains {
-                Some((r, place)) if !failed || place == INSTEAD => {
+                Some((r, place)) if !failed || place == Place::InsteadOfALeak => {
                     answer.located = of_what_remains(scene, &best.frame, &r, answer.located);
-                    answer.hypothesis = Some(of_remains(&r, &format!(" {place} {best_ids}.")));
+                    answer.hypothesis = Some(of_remains(&r, &format!(" {} {best_ids}.", place.said())));
                 }
                 _ if failed => {}
                 _ if self.open_wins => answer.hypothesis = Some(hypothesis(library, &best, &self.listed)),
@@ -306,7 +318,7 @@ struct Overturned {
     /// How probable what remains is.
     probability: f64,
     /// What remains where that is what is to be told, beside a formula where it is more than that explains; and what it is to the best set.
-    remains: Option<(Remains, &'static str)>,
+    remains: Option<(Remains, Place)>,
     /// What is not enough to overturn an explanation, as a note.
     doubt: Option<String>,
 }
@@ -340,7 +352,7 @@ fn with_remains(
     ];
     let remains = asked.into_iter().flatten().min_by(|a, b| a.probability.total_cmp(&b.probability));
     let (instead, doubt) = match chosen.and_then(|weighed| another_course(scene, library, weighed)) {
-        Some(AnotherCourse::Instead(told)) => (Some((told, INSTEAD)), None),
+        Some(AnotherCourse::Instead(told)) => (Some((told, Place::InsteadOfALeak)), None),
         Some(AnotherCourse::Maybe(note)) => (None, Some(note)),
         None => (None, None),
     };
@@ -351,7 +363,7 @@ fn with_remains(
     let probability = remains.as_ref().map_or(1.0, |r| r.probability);
     let told = |verdict, probability, remains| Overturned { verdict, probability, remains, doubt: None };
     match remains.filter(|r| r.probability <= allowed && r.energy > share * explained) {
-        Some(remains) => told(Verdict::Unexplained, probability, Some((remains, BESIDE))),
+        Some(remains) => told(Verdict::Unexplained, probability, Some((remains, Place::Beside))),
         None if instead.is_some() => told(Verdict::Unexplained, 1.0, instead),
         // What is too little to overturn an explanation says nothing against it.
         None if named => Overturned { doubt, ..told(verdict, 1.0, None) },
