@@ -84,7 +84,7 @@ fn write(out: &Path, folders: &[PathBuf], draws: Vec<Outcome>, score: Score) -> 
     progress.finish_and_clear();
     let evidence = Evidence { limits: LIMITS, score, draws, cases };
     output::write(&out.join("evidence.json"), &serde_json::to_string_pretty(&evidence)?)?;
-    output::write(&out.join("evidence.html"), &evidence.html(&plates))?;
+    output::write(&out.join("evidence.html"), evidence.html(&plates))?;
     eprintln!("evidence in {}", out.display());
     Ok(())
 }

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result};
-use oare_ground::paper::Report;
+use anyhow::{Context, Result, anyhow};
+use oare_ground::paper::{Report, bitmap};
 
 /// Whether two paths lead to one file that is there.
 pub fn is_one_file(a: &Path, b: &Path) -> bool {
@@ -12,16 +12,22 @@ pub fn is_one_file(a: &Path, b: &Path) -> bool {
 }
 
 /// Writes a file; its folder is made if need be.
-pub fn write(path: &Path, text: &str) -> Result<()> {
+pub fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<()> {
     if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
     }
-    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    fs::write(path, content).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Writes a report: `index.html`, its figures, and one JSON document beside them.
+/// Writes a report: `index.html`, its figures as SVG and PNG, and one JSON document beside them.
 pub fn write_report(folder: &Path, report: &Report, (json_name, json): (&str, &str)) -> Result<()> {
     write(&folder.join("index.html"), &report.html)?;
     write(&folder.join(json_name), json)?;
-    report.figures.iter().try_for_each(|(name, svg)| write(&folder.join(name), svg))
+    report.figures.iter().try_for_each(|(name, svg)| {
+        let path = folder.join(name);
+        write(&path, svg)?;
+        let bitmap =
+            bitmap::png(svg).map_err(|reason| anyhow!("cannot make a bitmap of {}: {reason}", path.display()))?;
+        write(&path.with_extension("png"), bitmap)
+    })
 }

@@ -162,7 +162,7 @@ fn write_recording(station: &Station, streams: &[Stream], path: &Path) -> Result
 }
 
 fn write_products(station: &Station, out: &Path) -> Result<()> {
-    write(&out.join("windows.csv"), &files::windows_csv(station))?;
+    write(&out.join("windows.csv"), files::windows_csv(station))?;
     write(&out.join("calibration.json"), &pretty(&files::calibration_json(station))?)?;
     write(&out.join("anomalies.json"), &pretty(&files::anomalies_json(station))?)?;
     write(&out.join("ledger.json"), &pretty(&files::ledger_json(station))?)

@@ -36,6 +36,29 @@ fn a_recording_of_a_dump_holds_its_calibrations_events_and_anomalies() {
     assert!(count("/accel/event") > 0);
 }
 
+/// A mission on paper is a page and its figures, each as SVG and as PNG.
+#[test]
+fn every_figure_of_a_report_is_there_as_svg_and_as_png() {
+    let dir = tempfile::tempdir().unwrap();
+    for arguments in [
+        &["simulate", "--hours", "6", "--seed", "3", "--out", "a.dump"][..],
+        &["process", "a.dump", "--out", "products", "--report", "paper"],
+    ] {
+        let output = oare(&dir, arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    let paper = dir.path().join("paper");
+    let stems = |extension: &str| {
+        let files = std::fs::read_dir(&paper).unwrap().map(|file| file.unwrap().path());
+        let of_kind = files.filter(|file| file.extension().is_some_and(|e| e == extension));
+        of_kind.map(|file| file.file_stem().unwrap().to_owned()).collect::<std::collections::BTreeSet<_>>()
+    };
+    assert!(stems("svg").contains(std::ffi::OsStr::new("scale")), "{:?}", stems("svg"));
+    assert_eq!(stems("svg"), stems("png"));
+    assert!(std::fs::read(paper.join("scale.png")).unwrap().starts_with(b"\x89PNG\r\n"));
+    assert_eq!(stems("html").len(), 1);
+}
+
 /// A radius of the table's turn that is written in another unit, or twice what it is, makes every value wrong by as much.
 #[test]
 fn a_scale_factor_that_no_sensor_has_is_told() {
