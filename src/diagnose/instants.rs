@@ -9,8 +9,11 @@ const MANOEUVRE: f64 = 8.0;
 const ROUNDING_RAD_S2: f64 = 1e-7;
 /// A change of attitude is over when it does not go on for so long, s: it is turned by one push and stopped by another.
 const STILL_S: f64 = 1800.0;
-/// What begins so near to the start or end of a change of attitude, s, may be of it.
+/// What begins so near to the start or end of a change of attitude, or of an entry of the log, s, may be of it.
 const TURN_S: f64 = 120.0;
+/// Share of the record that is so near to an entry of some kind, up to which being there says something.
+const SELDOM_NEAR: f64 = 0.03;
+
 /// What happens over and over, in words, and when.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recurring {
@@ -54,8 +57,32 @@ pub fn changes_of_attitude(s: &Scene) -> [Vec<f64>; 2] {
     [first.collect(), last.map(|(_, t)| *t).collect()]
 }
 
-/// What a push from an instant on takes for granted where the vehicle is turned or stopped just then: that it is not the turn's doing.
-pub fn of_a_turn(s: &Scene, onset_s: f64) -> Option<String> {
+/// What a push from an instant on takes for granted where something is known to happen just then: that it is not of that.
+pub fn of_chance(s: &Scene, onset_s: f64) -> Option<String> {
+    of_a_turn(s, onset_s).or_else(|| of_an_entry(s, onset_s))
+}
+
+/// The same of an entry of the log, of a kind that has few.
+fn of_an_entry(s: &Scene, onset_s: f64) -> Option<String> {
+    let [start, end] = s.span_s();
+    let near = s.case.kinds_tried().into_iter().flat_map(|kind| {
+        let spans = s.case.spans(kind);
+        let share = 4.0 * TURN_S * spans.len() as f64 / (end - start);
+        let ends = spans.into_iter().flat_map(|[from, to]| [("begins", from), ("ends", to)]);
+        ends.filter(move |_| share < SELDOM_NEAR).map(move |(which, at_s)| (kind, which, at_s))
+    });
+    let (kind, which, at_s) = near.min_by(|a, b| (a.2 - onset_s).abs().total_cmp(&(b.2 - onset_s).abs()))?;
+    let apart_s = (at_s - onset_s).abs();
+    (apart_s <= TURN_S).then(|| {
+        format!(
+            "its onset is {apart_s:.0} s from where an entry {kind} of the log {which}, at {at_s:.0} s, and that is taken for chance: what comes \
+             of the entry, and goes on after it, begins there as well"
+        )
+    })
+}
+
+/// The same of a change of attitude, where the vehicle is turned or stopped.
+fn of_a_turn(s: &Scene, onset_s: f64) -> Option<String> {
     let [begins, ends] = changes_of_attitude(s);
     let of = |which: &'static str, all: Vec<f64>| all.into_iter().map(move |t| (which, t));
     let nearest = of("begins", begins).chain(of("ends", ends));
@@ -143,5 +170,19 @@ mod tests {
         let far = |t: &f64| all.iter().all(|turn| (turn - t).abs() > TURN_S + 1.0);
         let beside = (0..1000).map(|i| start + (end - start) * f64::from(i) / 1000.0).find(far).unwrap();
         assert_eq!(of_a_turn(&scene, beside), None);
+    }
+
+    #[test]
+    fn an_onset_at_an_entry_of_a_kind_that_has_few_is_told() {
+        let case = made::case();
+        let scene = Scene::new(&case).unwrap();
+        let of_kind = |kind: &str| scene.case.spans(kind);
+        let [_, end_s] = of_kind("water_dump")[0];
+        let told = of_an_entry(&scene, end_s + 6.0).unwrap();
+        assert!(told.contains("6 s from where an entry water_dump of the log ends"), "{told}");
+        assert_eq!(of_an_entry(&scene, end_s + 3.0 * TURN_S), None);
+        // In so short a record two are so many that one is near by chance.
+        assert_eq!(of_kind("thruster").len(), 2);
+        assert_eq!(of_an_entry(&scene, of_kind("thruster")[1][0]), None);
     }
 }

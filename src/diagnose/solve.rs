@@ -8,7 +8,7 @@ use super::remains;
 use super::scene::{Axes, Scene};
 use super::search::{self, Bank, Entry, SET_MAX, Seen, Set, Weighed};
 use super::seldom;
-use super::whiteness::widening;
+use super::whiteness::louder_under;
 use crate::math::shared_work;
 
 /// Log prior odds of the open forms together; they share it.
@@ -43,7 +43,7 @@ const SEARCHES_MAX: usize = 4;
 
 /// What a search needs beside the scene, made once a case.
 pub struct Library {
-    /// Listed entries, then open ones, then those that are rarer, without starting points.
+    /// Listed entries, then open ones, then those that are rarer and a push for a while, without starting points.
     pub entries: Vec<Entry>,
     /// How many are listed.
     pub listed: usize,
@@ -83,6 +83,7 @@ impl Library {
         let mut seldom: Vec<&'static Seldom> = catalogue::SELDOM.iter().collect();
         seldom.retain(|s| is_allowed(s.effect));
         entries.extend(seldom.iter().map(|s| Entry::without_points(s.effect, s.log_odds)));
+        entries.push(Entry::without_points(&open_form::PUSH, 0.0));
         Self { entries, listed, searched, forms, seldom, without: without.to_vec() }
     }
 
@@ -99,6 +100,11 @@ impl Library {
     /// Those that are rarer, each at its place.
     pub fn seldom(&self) -> impl Iterator<Item = (usize, &'static Seldom)> {
         (self.searched..).zip(self.seldom.iter().copied())
+    }
+
+    /// The place of a push for a while.
+    pub fn push(&self) -> usize {
+        self.entries.len() - 1
     }
 
     /// The rarer one at this place, with its starting points.
@@ -146,7 +152,7 @@ impl Solution {
     }
 
     /// The same as far as it is proof: where what the best hypothesis leaves is louder than the noise fitted to it, at the periods at
-    /// which the hypothesis lives, or is not white, its gain in likelihood is worth less by that factor.
+    /// which the hypothesis lives, or is not white on its axes, its gain in likelihood is worth less by that factor.
     pub fn proven(&self, scene: &Scene, entries: &[Entry]) -> f64 {
         let (best, statistic) = (self.best(), self.statistic());
         if best.set.members.is_empty() {
@@ -161,7 +167,8 @@ impl Solution {
         let energy: f64 = signal.iter().flatten().map(|x| x * x).sum();
         // What the set pays for its sizes, shapes and prior comes off the likelihood it gains, and stays as it is.
         let paid = (0.5 * energy - (best.set.score - best.of_flips)).max(0.0);
-        let louder = remains::loudness_under(&left, &scene.schedule, &signal).max(widening(&left.whitened).powi(2));
+        let louder =
+            remains::loudness_under(&left, &scene.schedule, &signal).max(louder_under(&left.whitened, &signal));
         statistic - (1.0 - louder.recip()) * (statistic + paid)
     }
 }

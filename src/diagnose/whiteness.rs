@@ -38,7 +38,20 @@ pub fn coloured(whitened: &[f64]) -> Option<Coloured> {
 
 /// The most by which the errors of any axis are wider; 1 where all are white.
 pub fn widening(whitened: &Axes) -> f64 {
-    whitened.iter().filter_map(|x| coloured(x)).map(|coloured| coloured.widening).fold(1.0, f64::max)
+    whitened.iter().map(|axis| of_axis(axis)).fold(1.0, f64::max)
+}
+
+/// How much louder than white what is left is under a whitened signal: the mean over the axes, each with the energy that the signal has there.
+/// An axis on which it has none says nothing of it.
+pub fn louder_under(whitened: &Axes, signal: &Axes) -> f64 {
+    let energy = signal.each_ref().map(|axis| axis.iter().map(|x| x * x).sum::<f64>());
+    let all: f64 = energy.iter().sum();
+    let louder = |(axis, energy): (&Vec<f64>, &f64)| energy * of_axis(axis).powi(2);
+    if all > 0.0 { whitened.iter().zip(&energy).map(louder).sum::<f64>() / all } else { 1.0 }
+}
+
+fn of_axis(whitened: &[f64]) -> f64 {
+    coloured(whitened).map_or(1.0, |coloured| coloured.widening)
 }
 
 #[cfg(test)]
@@ -68,5 +81,20 @@ mod tests {
         assert!(told[0] <= 3, "{told:?}");
         assert_eq!(told[1], 200);
         assert_eq!(widening(&[vec![0.0, 1.0, -1.0], vec![1.0, -1.0, 0.0], vec![0.5, 0.1, 0.2]]), 1.0);
+    }
+
+    #[test]
+    fn a_signal_is_judged_by_the_axes_it_is_on() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let white: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut rng)).collect();
+        let follows: Vec<f64> = white.windows(2).map(|pair| pair[1] + 0.3 * pair[0]).collect();
+        let left = [white[1..].to_vec(), follows.clone(), white[1..].to_vec()];
+        let louder = coloured(&follows).unwrap().widening.powi(2);
+        assert!(louder > 1.5);
+        let on = |amplitudes: [f64; 3]| amplitudes.map(|amplitude| vec![amplitude; left[0].len()]);
+        assert_eq!(louder_under(&left, &on([1.0, 0.0, 0.5])), 1.0);
+        assert_eq!(louder_under(&left, &on([0.0, 2.0, 0.0])), louder);
+        assert!((louder_under(&left, &on([1.0, 1.0, 0.0])) - 0.5 * (1.0 + louder)).abs() < 1e-9);
+        assert_eq!(louder_under(&left, &on([0.0; 3])), 1.0);
     }
 }

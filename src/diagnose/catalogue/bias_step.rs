@@ -1,7 +1,7 @@
 //! The bias steps at an instant and stays.
 
 use super::{Effect, ONSET, SELDOM_LARGE, Shape, Theta, anywhere, in_sensor, is_inside, onsets, push};
-use crate::diagnose::instants::of_a_turn;
+use crate::diagnose::instants::of_chance;
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -20,7 +20,7 @@ pub const EFFECT: Effect = Effect {
     log_density: anywhere,
     signature,
     exact_at: None,
-    assumes: Some(|scene, theta| of_a_turn(scene, theta[0])),
+    assumes: Some(|scene, theta| of_chance(scene, theta[0])),
     why: "Each sensor axis jumps once, at one instant, and stays there whatever the attitude does.",
 };
 

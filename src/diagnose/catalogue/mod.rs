@@ -224,7 +224,7 @@ pub struct Nonlinear {
 
 impl Nonlinear {
     /// Neither refined nor jagged, without bounds and without a value of its own.
-    const PLAIN: Self = Self {
+    pub(in crate::diagnose) const PLAIN: Self = Self {
         name: "",
         unit: "",
         log: false,

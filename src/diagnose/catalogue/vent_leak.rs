@@ -1,7 +1,7 @@
 //! A decaying push fixed in the body from an unlogged instant.
 
 use super::{Effect, Nonlinear, ONSET, SELDOM_LARGE, Shape, Theta, onsets, push};
-use crate::diagnose::instants::of_a_turn;
+use crate::diagnose::instants::of_chance;
 use crate::diagnose::measure::decay;
 use crate::diagnose::scene::Scene;
 
@@ -23,7 +23,7 @@ pub const EFFECT: Effect = Effect {
     log_density,
     signature,
     exact_at: None,
-    assumes: Some(|scene, theta| of_a_turn(scene, theta[0]).or_else(|| of_a_slow_one(scene, theta))),
+    assumes: Some(|scene, theta| of_chance(scene, theta[0]).or_else(|| of_a_slow_one(scene, theta))),
     why: "A push fixed in the body begins at an instant no log names and dies away exponentially, whatever the attitude does.",
 };
 

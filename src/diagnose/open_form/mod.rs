@@ -8,9 +8,11 @@ mod history;
 mod instrument;
 mod motion;
 mod places;
+mod push;
 mod resets;
 mod surroundings;
 
+pub use self::push::PUSH;
 use crate::math::shared_work;
 use crate::physics::Vec3;
 

@@ -1,5 +1,6 @@
 //! Does a leak that is named die away as one? A push that ends, or grows until it does, is no leak, and is often near enough to one to be
-//! taken for it. Each is weighed in the leak's place, with as many parameters and the same sizes expected.
+//! taken for it, or to a leak and a step that end each other. Each is weighed in their place, with as many parameters as the leak and the same
+//! sizes expected.
 
 use crate::diagnose::answer::Interval;
 use crate::diagnose::case::HALF_WINDOW_S;
@@ -8,12 +9,12 @@ use crate::diagnose::model::entry_columns;
 use crate::diagnose::optimise::nelder_mead;
 use crate::diagnose::remains::{self, Remains};
 use crate::diagnose::scene::Scene;
-use crate::diagnose::search::{Set, Weighed};
+use crate::diagnose::search::{Member, Set, Weighed};
 use crate::diagnose::solve::Library;
 
-/// Log odds of another course against a leak from which on there is no leak: of leaks, one in some hundreds is so unlike one. And from which on
+/// Log odds of another course against a leak from which on there is no leak: of leaks, one in fifty at most is so unlike one. And from which on
 /// it is told that there may be none.
-const ODDS: f64 = 6.0;
+const ODDS: f64 = 4.0;
 const DOUBT: f64 = 0.0;
 /// Lengths tried first, in time constants of the leak, and how far before its onset they begin, in lengths.
 const LENGTHS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
@@ -68,35 +69,52 @@ pub enum AnotherCourse {
 /// What is likelier than a leak that is named, of several the likeliest.
 pub fn another_course(scene: &Scene, library: &Library, weighed: &Weighed) -> Option<AnotherCourse> {
     let (frame, set) = weighed.framed(scene, &library.entries);
-    let leaks = (0..set.members.len()).filter(|i| {
-        let effect = library.entries[set.members[*i].entry].effect();
-        effect.is_some_and(|effect| effect.id == "vent_leak")
-    });
-    let others = leaks.filter_map(|i| in_place_of(scene, library, &frame, &set, i));
+    let of_id = |id: &'static str| {
+        let is = |i: &usize| library.entries[set.members[*i].entry].effect().is_some_and(|effect| effect.id == id);
+        (0..set.members.len()).filter(is).collect::<Vec<usize>>()
+    };
+    let (leaks, steps) = (of_id("vent_leak"), of_id("bias_step"));
+    let both = leaks.iter().flat_map(|leak| steps.iter().map(|step| (*leak, Some(*step))));
+    let places = leaks.iter().map(|leak| (*leak, None)).chain(both);
+    let others = places.filter_map(|(leak, step)| in_place_of(scene, library, &frame, &set, leak, step));
     let (log_odds, other) = others.max_by(|a, b| a.0.total_cmp(&b.0))?;
     if log_odds > ODDS {
         return Some(AnotherCourse::Instead(other));
     }
     (log_odds > DOUBT).then(|| {
         AnotherCourse::Maybe(format!(
-            "vent_leak: that it dies away, as the catalogue's does, the record does not show: {} has log odds of {log_odds:.1} against it",
+            "vent_leak: that it dies away, as the catalogue's does, the record does not show: {} is likelier, by log odds of {log_odds:.1}",
             other.form
         ))
     })
 }
 
-/// The likeliest other course of one leak, and its log odds against it.
-fn in_place_of(scene: &Scene, library: &Library, frame: &Frame, set: &Set, i: usize) -> Option<(f64, Remains)> {
+/// The likeliest other course of one leak, or of that and a step, and its log odds against them.
+fn in_place_of(
+    scene: &Scene,
+    library: &Library,
+    frame: &Frame,
+    set: &Set,
+    i: usize,
+    step: Option<usize>,
+) -> Option<(f64, Remains)> {
     let clock_s = scene.clock_s();
     let [first_s, last_s] = [*clock_s.first()?, *clock_s.last()?];
     let leak = &set.members[i];
-    let entry = &library.entries[leak.entry];
     let sizes = leak.sizes(&library.entries);
-    let others = set.without(i);
+    let mut others = set.clone();
+    others.members =
+        (0..set.members.len()).filter(|j| *j != i && Some(*j) != step).map(|j| set.members[j].clone()).collect();
     let beside = others.chosen(frame);
     let sized = |column: (&Raw, &f64)| frame.column(column.0, *column.1);
-    let as_leak: Vec<Column> = entry_columns(scene, entry, &leak.theta)?.iter().zip(&sizes).map(sized).collect();
-    let of_leak = beside.gain(&as_leak);
+    let mut named: Vec<Column> = Vec::new();
+    for member in [Some(i), step].into_iter().flatten().map(|j| &set.members[j]) {
+        let columns = entry_columns(scene, &library.entries[member.entry], &member.theta)?;
+        named.extend(columns.iter().zip(&member.sizes(&library.entries)).map(sized));
+    }
+    // A step beside a leak has its own prior odds, and an instant of its own.
+    let paid = |member: &Member| library.entries[member.entry].log_prior + member.log_occam;
+    let of_named = beside.gain(&named) + step.map_or(0.0, |j| paid(&set.members[j]));
     let columns = |course: &Course, span: Span| -> Vec<Column> {
         let series = course.series(clock_s, span);
         sizes.iter().enumerate().map(|(axis, size)| frame.scalar(axis, &series, *size)).collect()
@@ -107,15 +125,18 @@ fn in_place_of(scene: &Scene, library: &Library, frame: &Frame, set: &Set, i: us
     };
     let [onset_s, tau_s] = [leak.theta[0], leak.theta[1].exp()];
     let best_of = |course: &'static Course| {
-        let first = LENGTHS.iter().flat_map(|length| {
+        let about_the_leak = LENGTHS.iter().flat_map(|length| {
             let length_s = length * tau_s;
             BEFORE.map(|before| Span { start_s: onset_s - before * length_s, length_s })
         });
-        let (span, gained) = refined(first, |span| gain(course, span))?;
+        let to_the_step = step
+            .map(|j| set.members[j].theta[0])
+            .map(|step_s| Span { start_s: onset_s.min(step_s), length_s: (step_s - onset_s).abs() });
+        let (span, gained) = refined(about_the_leak.chain(to_the_step), |span| gain(course, span))?;
         Some((course, span, gained))
     };
     let (course, span, gained) = COURSES.iter().filter_map(best_of).max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let log_odds = gained - of_leak - (COURSES.len() as f64).ln();
+    let log_odds = gained - of_named - (COURSES.len() as f64).ln();
     let (mean, _) = beside.normal(&columns(course, span)).posterior();
     let ng: [f64; 3] = std::array::from_fn(|axis| mean[axis] * sizes[axis]);
     let axes = remains::sharing(ng);
@@ -127,7 +148,16 @@ fn in_place_of(scene: &Scene, library: &Library, frame: &Frame, set: &Set, i: us
         form: format!("[{:.0}, {:.0}, {:.0}] ng on the mean x ({} {when}, else 0)", ng[0], ng[1], ng[2], course.said),
         axis: axes.join(", "),
         axes,
-        location: format!("{when}: it ends where a leak would die away, and has log odds of {log_odds:.1} against one"),
+        location: match step {
+            None => {
+                format!("{when}: it ends where a leak would die away, and has log odds of {log_odds:.1} against one")
+            }
+            Some(_) => {
+                format!(
+                    "{when}: a leak and a step would end each other there, and it has log odds of {log_odds:.1} against them"
+                )
+            }
+        },
         intervals: vec![Interval { start_s: span.start_s, end_s, why: course.said.into() }],
         period_s: None,
     };

@@ -37,8 +37,8 @@ pub fn fit(
         if let Some(Coloured { p, widening }) = coloured {
             inflation = inflation.max(widening);
             notes.push(format!(
-                "the whitened residual of axis {axis} is not white (p = {p:.1e}): errors are widened by {widening:.2}, and the evidence counts \
-                 for as much less"
+                "the whitened residual of axis {axis} is not white (p = {p:.1e}): errors are widened by {widening:.2}, and evidence on it \
+                 counts for as much less"
             ));
         }
     }

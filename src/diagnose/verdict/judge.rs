@@ -2,7 +2,7 @@
 
 use super::credible::simplest;
 use super::stands::{changes, fails, tried};
-use super::{Proof, asked};
+use super::{Proof, asked, ids};
 use crate::diagnose::answer::Verdict;
 use crate::diagnose::scene::Scene;
 use crate::diagnose::search::Weighed;
@@ -14,14 +14,22 @@ const REFUSED_MARGIN: f64 = 3.0;
 /// A finding that fails its trial is still a mismatch when noise makes its evidence this much more rarely than a claim asks.
 const BEYOND_DOUBT: f64 = 0.05;
 
+/// A finding that does not stand.
+pub struct Failure {
+    /// The set, in words.
+    pub set: String,
+    /// Why not.
+    pub why: String,
+}
+
 /// The judgement of a case.
 pub struct Judged<'a> {
     /// The verdict.
     pub verdict: Verdict,
     /// The set behind the verdict, and how its trial went.
     pub on_trial: Option<(&'a Weighed, Tried)>,
-    /// Why it failed.
-    pub failure: Option<String>,
+    /// A finding that failed its trial.
+    pub failure: Option<Failure>,
     /// An open form is better than every set of listed effects.
     pub open_wins: bool,
 }
@@ -50,7 +58,10 @@ pub fn judge<'a>(
     };
     let on_trial = chosen.map(|weighed| (weighed, tried(scene, library, weighed)));
     let changed = |weighed| (verdict == Verdict::Explained).then(|| changes(scene, library, weighed)).flatten();
-    let failure = on_trial.as_ref().and_then(|(weighed, tried)| fails(tried, statistic).or_else(|| changed(*weighed)));
+    let failure = on_trial.as_ref().and_then(|(weighed, tried)| {
+        let why = fails(tried, statistic).or_else(|| changed(*weighed))?;
+        Some(Failure { set: ids(library, &weighed.set).join(" + "), why })
+    });
     let (verdict, on_trial) = match &failure {
         Some(_) if probability > BEYOND_DOUBT * claim => (Verdict::Consistent, None),
         Some(_) => (Verdict::Unexplained, on_trial),

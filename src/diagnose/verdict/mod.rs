@@ -24,7 +24,7 @@ use self::claims::{of_claims, of_unknown_claims, of_unknown_keys};
 use self::credible::credible;
 use self::fit::fit;
 use self::inputs::of_inputs;
-use self::judge::{Judged, judge};
+use self::judge::{Failure, Judged, judge};
 use self::limits::upper_limits;
 use self::log_clock::of_another_clock;
 use self::named::name;
@@ -63,7 +63,7 @@ pub fn asked(claim: f64) -> f64 {
 const REMAINS_SHARE: f64 = 0.03;
 const REMAINS_BESIDE: f64 = 0.05;
 
-/// Shares of what remains after the evidence that go to laws of several variables, and, where something is named, to a second time of it.
+/// Shares of what remains after the evidence that go to laws of several variables, and to one push more.
 const JOINT_SHARE: f64 = 0.2;
 const AGAIN_SHARE: f64 = 0.1;
 
@@ -165,7 +165,7 @@ fn of_the_mismatch(
     let Judged { open_wins, failure, .. } = judged;
     let chosen = judged.on_trial.as_ref().map(|(weighed, _)| *weighed);
     if judged.verdict != Verdict::Unexplained || chosen.is_none() {
-        notes.extend(failure.clone());
+        notes.extend(failure.as_ref().map(|Failure { set, why }| format!("{set}: a finding is refused: {why}")));
     }
     let overturned = with_remains(scene, library, solution, (judged.verdict, chosen), proof);
     let Overturned { verdict, probability: least, remains, doubt } = overturned;
@@ -199,7 +199,7 @@ struct Findings<'a> {
     /// Listed sets whose sizes can be believed.
     listed: Vec<&'a Weighed>,
     open_wins: bool,
-    failure: Option<String>,
+    failure: Option<Failure>,
     /// And what it is to the best set.
     remains: Option<(Remains, Place)>,
     tried: Tried,
@@ -248,7 +248,7 @@ impl Findings<'_> {
         if answer.verdict == Verdict::Unexplained {
             let best_ids = ids(library, &best.set).join(" + ");
             let failed = self.failure.is_some();
-            answer.notes.extend(self.failure.map(|failure| of_failure(&best_ids, &failure)));
+            answer.notes.extend(self.failure.as_ref().map(of_failure));
             match self.remains {
                 Some((r, place)) if !failed || place == Place::InsteadOfALeak => {
                     answer.located = of_what_remains(scene, &best.frame, &r, answer.located);
@@ -340,15 +340,14 @@ fn with_remains(
     let lessened =
         |r: Remains| Remains { probability: r.probability.powf(wider.recip()), energy: r.energy / wider, ..r };
     let named = verdict == Verdict::Explained;
-    let again_share = if named { AGAIN_SHARE } else { 0.0 };
     let (asked, (joint, again)) = shared_work::both(
         || remains::strongest(&left, &weighed.noise, &scene.schedule, &scene.loudness, &recurring(scene)),
-        || (joint::strongest(scene, &weighed.noise, &left), named.then(|| again(scene, library, weighed)).flatten()),
+        || (joint::strongest(scene, &weighed.noise, &left), again(scene, library, solution, weighed)),
     );
     let asked = [
-        asked.map(chances(1.0 - JOINT_SHARE - again_share)),
+        asked.map(chances(1.0 - JOINT_SHARE - AGAIN_SHARE)),
         joint.map(lessened).map(chances(JOINT_SHARE)),
-        again.map(lessened).map(chances(again_share)),
+        again.map(lessened).map(chances(AGAIN_SHARE)),
     ];
     let remains = asked.into_iter().flatten().min_by(|a, b| a.probability.total_cmp(&b.probability));
     let (instead, doubt) = match chosen.and_then(|weighed| another_course(scene, library, weighed)) {
@@ -362,9 +361,12 @@ fn with_remains(
     let share = if verdict == Verdict::Unexplained { 1.0 } else { REMAINS_SHARE };
     let probability = remains.as_ref().map_or(1.0, |r| r.probability);
     let told = |verdict, probability, remains| Overturned { verdict, probability, remains, doubt: None };
+    // What remains beside a leak that is none is what that leaves of another course.
+    if instead.is_some() {
+        return told(Verdict::Unexplained, 1.0, instead);
+    }
     match remains.filter(|r| r.probability <= allowed && r.energy > share * explained) {
         Some(remains) => told(Verdict::Unexplained, probability, Some((remains, Place::Beside))),
-        None if instead.is_some() => told(Verdict::Unexplained, 1.0, instead),
         // What is too little to overturn an explanation says nothing against it.
         None if named => Overturned { doubt, ..told(verdict, 1.0, None) },
         None => told(verdict, probability, None),

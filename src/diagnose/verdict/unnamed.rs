@@ -1,5 +1,6 @@
 //! What is said of a mismatch that no effect explains: a description, not a cause.
 
+use super::judge::Failure;
 use super::{Best, ids};
 use crate::diagnose::answer::Hypothesis;
 use crate::diagnose::remains::Remains;
@@ -21,8 +22,8 @@ pub fn of_remains(r: &Remains, beside: &str) -> Hypothesis {
 }
 
 /// Of a set whose evidence is beyond doubt, and which failed its trial: something is there, and it is not this.
-pub fn of_failure(set: &str, failure: &str) -> String {
-    format!("It is where {set} would act, which comes nearest; but {failure}.")
+pub fn of_failure(Failure { set, why }: &Failure) -> String {
+    format!("It is where {set} would act, which comes nearest; but a finding is refused: {why}.")
 }
 
 /// By how much the listed sets that came near are less likely than the best of all.
