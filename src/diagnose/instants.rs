@@ -10,8 +10,8 @@ const ROUNDING_RAD_S2: f64 = 1e-7;
 /// A change of attitude is over when it does not go on for so long, s: it is turned by one push and stopped by another.
 const STILL_S: f64 = 1800.0;
 /// What begins so near to the start or end of a change of attitude, or of an entry of the log, s, may be of it.
-const TURN_S: f64 = 120.0;
-/// Share of the record that is so near to an entry of some kind, up to which being there says something.
+const NEAR_S: f64 = 120.0;
+/// Share of the record that is so near to the entries of a kind, up to which being there says something: eight entries in 36 h.
 const SELDOM_NEAR: f64 = 0.03;
 
 /// What happens over and over, in words, and when.
@@ -67,13 +67,14 @@ fn of_an_entry(s: &Scene, onset_s: f64) -> Option<String> {
     let [start, end] = s.span_s();
     let near = s.case.kinds_tried().into_iter().flat_map(|kind| {
         let spans = s.case.spans(kind);
-        let share = 4.0 * TURN_S * spans.len() as f64 / (end - start);
+        // Before and after its start, and before and after its end.
+        let share = 4.0 * NEAR_S * spans.len() as f64 / (end - start);
         let ends = spans.into_iter().flat_map(|[from, to]| [("begins", from), ("ends", to)]);
         ends.filter(move |_| share < SELDOM_NEAR).map(move |(which, at_s)| (kind, which, at_s))
     });
     let (kind, which, at_s) = near.min_by(|a, b| (a.2 - onset_s).abs().total_cmp(&(b.2 - onset_s).abs()))?;
     let apart_s = (at_s - onset_s).abs();
-    (apart_s <= TURN_S).then(|| {
+    (apart_s <= NEAR_S).then(|| {
         format!(
             "its onset is {apart_s:.0} s from where an entry {kind} of the log {which}, at {at_s:.0} s, and that is taken for chance: what comes \
              of the entry, and goes on after it, begins there as well"
@@ -88,7 +89,7 @@ fn of_a_turn(s: &Scene, onset_s: f64) -> Option<String> {
     let nearest = of("begins", begins).chain(of("ends", ends));
     let (which, at_s) = nearest.min_by(|a, b| (a.1 - onset_s).abs().total_cmp(&(b.1 - onset_s).abs()))?;
     let apart_s = (at_s - onset_s).abs();
-    (apart_s <= TURN_S).then(|| {
+    (apart_s <= NEAR_S).then(|| {
         format!(
             "its onset is {apart_s:.0} s from where a change of attitude {which}, at {at_s:.0} s, and that is taken for chance: what a turn \
              moves or warms, a fluid or a structure, begins there as well"
@@ -167,7 +168,7 @@ mod tests {
         let told = of_a_turn(&scene, all[0] - 100.0).unwrap();
         assert!(told.contains("its onset is 100 s from where a change of attitude"), "{told}");
         let [start, end] = scene.span_s();
-        let far = |t: &f64| all.iter().all(|turn| (turn - t).abs() > TURN_S + 1.0);
+        let far = |t: &f64| all.iter().all(|turn| (turn - t).abs() > NEAR_S + 1.0);
         let beside = (0..1000).map(|i| start + (end - start) * f64::from(i) / 1000.0).find(far).unwrap();
         assert_eq!(of_a_turn(&scene, beside), None);
     }
@@ -180,7 +181,7 @@ mod tests {
         let [_, end_s] = of_kind("water_dump")[0];
         let told = of_an_entry(&scene, end_s + 6.0).unwrap();
         assert!(told.contains("6 s from where an entry water_dump of the log ends"), "{told}");
-        assert_eq!(of_an_entry(&scene, end_s + 3.0 * TURN_S), None);
+        assert_eq!(of_an_entry(&scene, end_s + 3.0 * NEAR_S), None);
         // In so short a record two are so many that one is near by chance.
         assert_eq!(of_kind("thruster").len(), 2);
         assert_eq!(of_an_entry(&scene, of_kind("thruster")[1][0]), None);

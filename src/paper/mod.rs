@@ -1,7 +1,7 @@
 //! What every report on paper shares: its figures, its page and its tables. A page is one self-contained file, no script, nothing
 //! fetched, made to be printed; a figure is an SVG text, inside the page and beside it, there as a bitmap too.
 //!
-//! Texts in, texts out. Not here: what a report says, and who writes the files.
+//! Texts in, texts out, and octets of a bitmap. Not here: what a report says, and who writes the files.
 
 pub mod bitmap;
 pub mod drawing;
