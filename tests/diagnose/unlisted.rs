@@ -136,6 +136,24 @@ fn a_thermostat_is_no_step_and_no_temperature_bias() {
     is_unlisted(&with(heater, [0.8, -0.5, 0.2]), "on below T = ");
 }
 
+/// It lags behind as long as the temperature rises or falls, and stands still after every reversal.
+#[test]
+fn what_follows_the_temperature_with_a_slack_has_no_lag() {
+    let moved = |case: &Case| {
+        let ancillary = &case.ancillary;
+        let t = window_means(&ancillary.clock_s, &ancillary.temperature_c, &case.recording.clock_s, 0.0);
+        let mean = t.iter().sum::<f64>() / t.len() as f64;
+        let half = 0.5 * (t.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / t.len() as f64).sqrt();
+        let mut moved = t[0];
+        let follow = |t: &f64| {
+            moved = moved.clamp(t - half, t + half);
+            moved
+        };
+        t.iter().map(follow).collect()
+    };
+    is_unlisted(&with(moved, [0.7, -0.6, 0.4]), "T through a slack of ");
+}
+
 /// A thruster that pushes the less the longer it has rested.
 #[test]
 fn what_only_a_thruster_still_warm_does_is_no_residual_of_every_firing() {

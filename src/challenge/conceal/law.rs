@@ -8,6 +8,7 @@ use rand_chacha::ChaCha12Rng;
 use super::draw::{between, direction, log_between, pick};
 use super::flight::{Flight, STEP_S};
 use super::force::{self, Series};
+use crate::math::rms::rms_about_mean;
 
 /// Name and plain statement of every law that is drawn.
 pub const LAWS: [(&str, &str); 16] = [
@@ -30,13 +31,14 @@ pub const LAWS: [(&str, &str); 16] = [
 ];
 
 /// Laws that are there by name only: what is drawn stays what it was.
-const LAWS_BY_NAME: [(&str, &str); 6] = [
+const LAWS_BY_NAME: [(&str, &str); 7] = [
     ("unknown_ringing", "a damped oscillation after every change of attitude"),
     ("unknown_packet", "an oscillation that swells and fades once"),
     ("unknown_slow_chirp", "a slow oscillation of drifting period"),
     ("unknown_delayed", "a push of minutes some time after every logged event"),
     ("unknown_clock", "a ramp that starts again at even distances of its own"),
     ("unknown_push", "one push that ends"),
+    ("unknown_slack", "the temperature, followed with a slack"),
 ];
 
 /// Name and plain statement of every law.
@@ -97,6 +99,10 @@ pub fn signature(rng: &mut ChaCha12Rng, name: &str, flight: &Flight, total: &[Ve
         "unknown_delayed" => along(delayed(rng, flight), fixed),
         "unknown_clock" => along(clock(rng, flight), fixed),
         "unknown_push" => along(one_push(rng, flight), fixed),
+        "unknown_slack" => {
+            let slack_c = between(rng, 0.5, 2.0) * rms_about_mean(&flight.temperature_c);
+            along(followed(&flight.temperature_c, slack_c), fixed)
+        }
         "unknown_telegraph" => along(telegraph(rng, n), fixed),
         "unknown_density_temperature" => {
             let density = force::density(flight, force::WHOLE_AIR);
@@ -144,17 +150,18 @@ fn region(flight: &Flight, k: usize, longitude_deg: f64, width_deg: f64) -> f64 
 }
 
 /// A play operator: follows the temperature only beyond a slack.
-fn play(temperature_c: &[f64], slack_c: f64) -> Vec<f64> {
+fn followed(temperature_c: &[f64], slack_c: f64) -> Vec<f64> {
     let mut state = temperature_c[0];
-    let out: Vec<f64> = temperature_c
-        .iter()
-        .map(|t| {
-            state = state.clamp(t - slack_c / 2.0, t + slack_c / 2.0);
-            state
-        })
-        .collect();
-    // What remains beside the temperature itself is the hysteresis; a tenth of the linear part stays in it.
-    out.iter().zip(temperature_c).map(|(s, t)| (s - t) + 0.1 * t).collect()
+    let follow = |t: &f64| {
+        state = state.clamp(t - slack_c / 2.0, t + slack_c / 2.0);
+        state
+    };
+    temperature_c.iter().map(follow).collect()
+}
+
+/// What remains beside the temperature itself is the hysteresis; a tenth of the linear part stays in it.
+fn play(temperature_c: &[f64], slack_c: f64) -> Vec<f64> {
+    followed(temperature_c, slack_c).iter().zip(temperature_c).map(|(s, t)| (s - t) + 0.1 * t).collect()
 }
 
 fn echo(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {

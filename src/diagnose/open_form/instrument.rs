@@ -54,20 +54,22 @@ pub(super) fn sensor(c: &mut Collector) {
             s.field_body_t[g][i] * (t[g] - mean)
         });
     }
-    // Hysteresis: what a follower with slack lags behind (the play operator of Prandtl 1928).
     let behind = |series: &[f64], slack: f64| -> Vec<f64> {
-        let mut follower = series[0];
-        let follow = |x: &f64| {
-            follower = follower.clamp(x - slack / 2.0, x + slack / 2.0);
-            follower - x
-        };
-        series.iter().map(follow).collect()
+        following(series, slack).iter().zip(series).map(|(follower, x)| follower - x).collect()
     };
     let slacks = [0.15, 0.3, 0.5, 0.8, 1.2].map(|slack| {
         let behind = behind(t, slack);
         (format!("T behind itself by a slack of {slack:.2} C"), s.measure_scalar(|g| behind[g]))
     });
     c.family("temperature", "reversals of the temperature", slacks);
+    // What is moved by it alone, through a slack, is the follower itself.
+    let deviation = crate::math::rms::rms_about_mean(t);
+    let followers = [0.4, 0.8, 1.2, 1.7, 2.4].map(|share| {
+        let slack = share * deviation;
+        let follower = following(t, slack);
+        (format!("T through a slack of {slack:.2} C"), s.measure_scalar(|g| follower[g]))
+    });
+    c.family("temperature", "reversals of the temperature", followers);
     for i in 0..3 {
         let rms = crate::math::rms::rms_about_mean(&m[i]);
         let slacks = [0.5, 1.0, 2.0].map(|share| {
@@ -99,6 +101,16 @@ pub(super) fn sensor(c: &mut Collector) {
             Vec3::new(s.simulated_grid_ng[0][g], s.simulated_grid_ng[1][g], s.simulated_grid_ng[2][g]) * (t[g] - mean)
         }],
     );
+}
+
+/// Hysteresis: what follows a series with slack (the play operator of Prandtl 1928), from what that begins with.
+fn following(series: &[f64], slack: f64) -> Vec<f64> {
+    let mut follower = series[0];
+    let follow = |x: &f64| {
+        follower = follower.clamp(x - slack / 2.0, x + slack / 2.0);
+        follower
+    };
+    series.iter().map(follow).collect()
 }
 
 /// A relay by the temperature, as the thermostat of a heater: on below one level and off above another, each at one of these shares of

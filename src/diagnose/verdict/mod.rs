@@ -263,7 +263,7 @@ impl Findings<'_> {
             }
         } else {
             answer.notes.extend(of_assumptions(scene, library, &best.set));
-            name(&mut answer, scene, library, &best, &self.listed);
+            name(&mut answer, scene, library, &best, &self.listed, &self.solution.open);
             answer.notes.extend(of_claims(scene, &answer.effects, answer.verdict));
         }
         (answer, signal)

@@ -20,15 +20,22 @@ const RIVAL: f64 = 5.0;
 /// Posterior below which an alternative is not mentioned.
 const MENTION: f64 = 0.004;
 
-/// Names the effects of the best set, with their rivals and alternatives.
-pub fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Best, listed: &[&Weighed]) {
+/// Names the effects of the best set, with their rivals and alternatives; `open` are the sets with a formula of no effect in them.
+pub fn name(
+    answer: &mut Diagnosis,
+    scene: &Scene,
+    library: &Library,
+    best: &Best,
+    listed: &[&Weighed],
+    open: &[Weighed],
+) {
     let top = listed[0].log_posterior;
-    let total: f64 = listed.iter().map(|w| (w.log_posterior - top).exp()).sum();
+    let all = || listed.iter().copied().chain(open);
+    let total: f64 = all().map(|w| (w.log_posterior - top).exp()).sum();
     let posterior = |w: &Weighed| (w.log_posterior - top).exp() / total;
     let key = best.set.key();
-    answer.effects = effects(library, best, |entry| {
-        listed.iter().filter(|w| w.set.key().contains(&entry)).map(|w| posterior(w)).sum()
-    });
+    answer.effects =
+        effects(library, best, |entry| all().filter(|w| w.set.key().contains(&entry)).map(posterior).sum());
     let others: Vec<&&Weighed> = listed.iter().filter(|w| w.set.key() != key).collect();
     let rivals: Vec<&&&Weighed> = others
         .iter()
@@ -65,6 +72,20 @@ pub fn name(answer: &mut Diagnosis, scene: &Scene, library: &Library, best: &Bes
         })
         .collect();
     answer.notes.extend(of_larger_sets(best, library, listed));
+    answer.notes.extend(of_a_formula(best, library, open));
+}
+
+/// Says which formula of no effect comes near enough for the record not to tell it from what is named.
+fn of_a_formula(best: &Best, library: &Library, open: &[Weighed]) -> Option<String> {
+    let formula = open.iter().find(|w| !is_nested(&w.set, &best.set))?;
+    let log_odds = best.weighed.log_posterior - formula.log_posterior;
+    (log_odds < RIVAL).then(|| {
+        format!(
+            "{}, of which the catalogue knows nothing, this record cannot tell from {}: log odds of {log_odds:.1} against it",
+            ids(library, &formula.set).join(" + "),
+            ids(library, &best.set).join(" + ")
+        )
+    })
 }
 
 /// Says what beside the named is likelier than not, and not sure enough to be named.
