@@ -150,6 +150,7 @@ impl Service {
             mission: settings.time,
             started: Instant::now(),
             token: config.http.token.clone(),
+            loopback_only: config.http.address.ip().is_loopback() && !config.http.insecure,
             live_permits: Arc::new(Semaphore::new(config.http.live_clients_max)),
             live_behind_max: config.http.live_behind_messages as u64,
             data_dir: config.data_dir.clone(),

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use axum::extract::{Query, Request, State};
 use axum::http::header::{AUTHORIZATION, CONTENT_LENGTH, HOST, ORIGIN, RETRY_AFTER, WWW_AUTHENTICATE};
+use axum::http::uri::Authority;
 use axum::http::{HeaderValue, StatusCode, Uri};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
@@ -50,22 +51,37 @@ fn refuse(app: &App, request: &Request) -> Option<Response> {
     refuse_token(app, request).or_else(|| refuse_foreign_page(app, request))
 }
 
-/// Where no token protects the service, its being on the loopback does; but a browser on this machine would let a page of any site in.
+/// Where no token protects the service, its being on the loopback does; but a browser on this machine would let a page of any site in, and
+/// one of a site whose name leads here by its own host.
 fn refuse_foreign_page(app: &App, request: &Request) -> Option<Response> {
+    if app.token.is_some() {
+        return None;
+    }
     let of = |name| request.headers().get(name).and_then(|value| value.to_str().ok());
-    let origin: Uri = of(ORIGIN).filter(|_| app.token.is_none())?.parse().ok()?;
-    // A page that is of no site, as one from a file, says `null`.
-    let origin = origin.scheme().and(origin.authority())?;
-    let host = origin.host().trim_start_matches('[').trim_end_matches(']');
-    let is_here =
-        host.eq_ignore_ascii_case("localhost") || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback());
-    let is_own = of(HOST).is_some_and(|host| host.eq_ignore_ascii_case(origin.as_str()));
-    (!is_here && !is_own).then(|| {
-        let detail = format!(
+    let detail = if let Some(host) = of(HOST).filter(|host| app.loopback_only && !is_here(host)) {
+        format!(
+            "{host} is not this machine's own name, which a service without a token is asked by: localhost or 127.0.0.1"
+        )
+    } else {
+        let origin = of(ORIGIN)?;
+        let of_site = origin.parse::<Uri>().ok().and_then(|uri| uri.scheme().and(uri.authority()).cloned());
+        let is_own = |site: &Authority| of(HOST).is_some_and(|host| host.eq_ignore_ascii_case(site.as_str()));
+        // A page of no site says `null`: one from a file, and as well a frame in a page of any.
+        if of_site.as_ref().is_some_and(|site| is_here(site.as_str()) || is_own(site)) {
+            return None;
+        }
+        format!(
             "a page of {origin} may not read a service that has no token; http.token in its configuration gives it one"
-        );
-        Problem::new(StatusCode::FORBIDDEN, detail).into_response()
-    })
+        )
+    };
+    Some(Problem::new(StatusCode::FORBIDDEN, detail).into_response())
+}
+
+/// Whether a host, with or without a port, is this machine by its own name.
+fn is_here(host: &str) -> bool {
+    let Ok(authority) = host.parse::<Authority>() else { return false };
+    let name = authority.host().trim_start_matches('[').trim_end_matches(']');
+    name.eq_ignore_ascii_case("localhost") || name.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
 }
 
 /// Turns away what is not all there while the raw log is being read again.

@@ -55,6 +55,8 @@ pub struct App {
     pub started: Instant,
     /// The bearer token, if one is needed.
     pub token: Option<String>,
+    /// Served to this machine alone.
+    pub loopback_only: bool,
     /// A permit per WebSocket client.
     pub live_permits: Arc<Semaphore>,
     /// A WebSocket client further behind than this many messages is told what it missed.

@@ -45,12 +45,12 @@ pub fn clock(mission: &MissionTime, name: &str, text: &str) -> Result<Clock, Pro
     Ok(Clock::from_seconds(clock_s))
 }
 
-/// As [`clock`], for a parameter that may be absent.
+/// As [`clock`], for a parameter that may be absent. One that is there and empty is a mistake: what it was to say is not known.
 ///
 /// # Errors
 /// As [`clock`].
 pub fn optional_clock(mission: &MissionTime, name: &str, text: Option<&str>) -> Result<Option<Clock>, Problem> {
-    text.filter(|text| !text.is_empty()).map(|text| clock(mission, name, text)).transpose()
+    text.map(|text| clock(mission, name, text)).transpose()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Files that commands leave behind; what could not be written is told with its path.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, anyhow};
 use oare_ground::paper::{Report, bitmap};
@@ -9,6 +9,12 @@ use oare_ground::paper::{Report, bitmap};
 /// Whether two paths lead to one file that is there.
 pub fn is_one_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
+}
+
+/// Says which of the files to be written is one that was read.
+pub fn over_an_input(outputs: impl IntoIterator<Item = PathBuf>, inputs: &[&Path]) -> Option<String> {
+    let over = outputs.into_iter().find(|output| inputs.iter().any(|input| is_one_file(input, output)))?;
+    Some(format!("{}: that is an input, and is not written over", over.display()))
 }
 
 /// Writes a file; its folder is made if need be.

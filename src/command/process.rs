@@ -18,7 +18,7 @@ use oare_ground::record::{mcap_file::Recording, mcap_reader};
 use oare_ground::units::Clock;
 use sha2::{Digest, Sha256};
 
-use super::output::{write, write_report};
+use super::output::{over_an_input, write, write_report};
 
 /// Arguments of `oare process`.
 #[derive(clap::Args)]
@@ -43,8 +43,20 @@ pub struct Args {
     json: bool,
 }
 
+/// What is written into the folder for the products, and beside the figures into that of the report.
+const PRODUCTS: [&str; 5] = ["windows.csv", "calibration.json", "anomalies.json", "ledger.json", RECORDING];
+const RECORDING: &str = "recording.mcap";
+const REPORT: [&str; 2] = ["index.html", "accuracy.json"];
+
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
+    let inputs: Vec<&Path> =
+        args.files.iter().chain(&args.config).chain(&args.calibration).map(PathBuf::as_path).collect();
+    let of_report = args.report.iter().flat_map(|folder| REPORT.map(|name| folder.join(name)));
+    if let Some(over) = over_an_input(PRODUCTS.map(|name| args.out.join(name)).into_iter().chain(of_report), &inputs) {
+        eprintln!("oare process: {over}");
+        return Ok(super::unusable());
+    }
     let settings = match super::serve::read_config(args.config) {
         Ok(Config { settings, .. }) => settings,
         Err(error) => {
@@ -74,10 +86,10 @@ pub fn run(args: Args) -> Result<ExitCode> {
     }
     let station = replay(&settings, known.as_ref(), |station| take_all(station, &streams));
     write_products(&station, &args.out)?;
-    write_recording(&station, &streams, &args.out.join("recording.mcap"))?;
+    write_recording(&station, &streams, &args.out.join(RECORDING))?;
     if let Some(folder) = &args.report {
         let report = report(&station);
-        write_report(folder, &report.paper, ("accuracy.json", &pretty(&report.accuracy)?))?;
+        write_report(folder, &report.paper, (REPORT[1], &pretty(&report.accuracy)?))?;
     }
     for (path, stream) in args.files.iter().zip(&streams).filter(|(_, stream)| stream.frames.get() == 0) {
         let (file, octets) = (path.display(), stream.octets.len());
@@ -162,10 +174,11 @@ fn write_recording(station: &Station, streams: &[Stream], path: &Path) -> Result
 }
 
 fn write_products(station: &Station, out: &Path) -> Result<()> {
-    write(&out.join("windows.csv"), files::windows_csv(station))?;
-    write(&out.join("calibration.json"), &pretty(&files::calibration_json(station))?)?;
-    write(&out.join("anomalies.json"), &pretty(&files::anomalies_json(station))?)?;
-    write(&out.join("ledger.json"), &pretty(&files::ledger_json(station))?)
+    let [windows, calibration, anomalies, ledger, _] = PRODUCTS.map(|name| out.join(name));
+    write(&windows, files::windows_csv(station))?;
+    write(&calibration, &pretty(&files::calibration_json(station))?)?;
+    write(&anomalies, &pretty(&files::anomalies_json(station))?)?;
+    write(&ledger, &pretty(&files::ledger_json(station))?)
 }
 
 fn pretty(value: &serde_json::Value) -> Result<String> {

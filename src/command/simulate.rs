@@ -7,11 +7,13 @@ use std::process::ExitCode;
 use anyhow::Context as _;
 
 use oare_ground::ingest::wire::LinkConfig;
-use oare_ground::simulate::expected::case_files;
+use oare_ground::simulate::expected::{CASE_FILES, case_files};
 use oare_ground::simulate::mission_file::{Overrides, from_toml};
 use oare_ground::simulate::recorder::{Framer, Packetiser};
 use oare_ground::simulate::truth::{TruthBuilder, instrument_json, truth_csv};
 use oare_ground::simulate::{Mission, SimulateError, playbacks};
+
+use super::output::over_an_input;
 
 /// Fly a simulated mission and write its recorder dump, with the truth beside it.
 #[derive(clap::Args)]
@@ -40,11 +42,8 @@ pub struct Args {
 
 /// Flies the mission.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    if args.truth.as_ref() == Some(&args.out) {
-        eprintln!(
-            "oare simulate: --out and --truth are both {}: one would be written over the other",
-            args.out.display()
-        );
+    if let Some(misplaced) = misplaced(&args) {
+        eprintln!("oare simulate: {misplaced}");
         return Ok(super::unusable());
     }
     let text = match &args.config {
@@ -88,9 +87,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let passes = playbacks(&frames, &link, &file.recorder, mission.config().seed);
     let octets: Vec<u8> = passes.iter().flat_map(|pass| pass.octets.iter().copied()).collect();
     write(&args.out, &octets)?;
-    let truth_path = args.truth.unwrap_or_else(|| args.out.with_extension("truth.csv"));
+    let [truth_path, instrument_path] = beside(&args);
     write(&truth_path, truth_csv(&windows).as_bytes())?;
-    write(&args.out.with_extension("instrument.json"), instrument_json(&mission).as_bytes())?;
+    write(&instrument_path, instrument_json(&mission).as_bytes())?;
     if let Some(folder) = &args.case
         && let Err(problems) = write_case(&mission, folder, &args.out)?
     {
@@ -105,6 +104,27 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         truth_path.display()
     );
     Ok(super::DONE)
+}
+
+/// Where the true accelerations and the true instrument go.
+fn beside(args: &Args) -> [PathBuf; 2] {
+    let truth = args.truth.clone().unwrap_or_else(|| args.out.with_extension("truth.csv"));
+    [truth, args.out.with_extension("instrument.json")]
+}
+
+/// Which file would be written over another, or over the mission file.
+fn misplaced(args: &Args) -> Option<String> {
+    let [truth, instrument] = beside(args);
+    if truth == args.out || truth == instrument {
+        let path = truth.display();
+        return Some(format!(
+            "--truth {path}: the dump or the instrument goes there, and one would be written over the other"
+        ));
+    }
+    let of_case = args.case.iter().flat_map(|folder| CASE_FILES.map(|name| folder.join(name)));
+    let outputs = [args.out.clone(), truth, instrument].into_iter().chain(of_case);
+    let inputs: Vec<&Path> = args.config.iter().map(PathBuf::as_path).collect();
+    over_an_input(outputs, &inputs)
 }
 
 fn write_case(mission: &Mission, folder: &Path, dump: &Path) -> anyhow::Result<Result<(), Vec<SimulateError>>> {

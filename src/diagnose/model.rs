@@ -2,6 +2,8 @@
 //!
 //! The covariance is that of the linearised joint fit, coefficients and nonlinear parameters together, at the fitted noise.
 
+mod time_constant;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::axes;
@@ -62,6 +64,7 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
             out.push(fit);
             continue;
         };
+        let first_theta = theta_next;
         for (j, p) in effect.nonlinear.iter().enumerate() {
             if p.name == "axis" {
                 fit.axis = Some(["x", "y", "z"][m.theta[j] as usize].to_string());
@@ -86,12 +89,16 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
                 _ => sigma,
             };
             let value = if p.log { m.theta[j].exp() } else { m.theta[j] };
-            fit.parameters.push(Fitted {
-                name: p.name,
-                value,
-                sigma: if p.log { value * sigma } else { sigma },
-                unit: p.unit,
-            });
+            let sigma = if p.log {
+                let follow = follows(&joint, theta_next - 1, first_theta..first_theta + free_of(effect));
+                let place = (out.len(), effect, j);
+                let scanned =
+                    time_constant::error(scene, frame, entries, set, place, (sigma / inflation, follow)).unwrap_or(0.0);
+                (value * sigma).max(scanned * inflation)
+            } else {
+                sigma
+            };
+            fit.parameters.push(Fitted { name: p.name, value, sigma, unit: p.unit });
         }
         for (k, l) in effect.linear.iter().enumerate().take(m.linear()) {
             fit.parameters.push(Fitted {
@@ -105,6 +112,17 @@ pub fn parameters(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set, in
         out.push(fit);
     }
     out
+}
+
+/// How many nonlinear numbers of an effect are fitted.
+fn free_of(effect: &Effect) -> usize {
+    effect.nonlinear.iter().filter(|p| p.step > 0.0).count()
+}
+
+/// By how much the other fitted number of a member moves with the one in this row of the covariance; 0 without another.
+fn follows(joint: &DMatrix<f64>, row: usize, of_member: std::ops::Range<usize>) -> f64 {
+    let slope = |other: usize| Some(joint.get((other, row))? / joint.get((row, row))?);
+    of_member.filter(|other| *other != row).find_map(slope).filter(|slope| slope.is_finite()).unwrap_or(0.0)
 }
 
 /// Half width of the scan of an onset's posterior, s, and its steps to either side. While the posterior is not low at an end of

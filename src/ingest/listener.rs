@@ -1,7 +1,7 @@
 //! The dump port: connections in, parts of playbacks out to the one writer.
 //!
 //! A connection is read by a task and decoded by a thread of its own that gives way to those who answer. It never writes to a
-//! sender. How a stream is cut into reads changes nothing. Not here: what is durable (see `raw_log`) and what the frames mean (see
+//! sender; it closes its end once all that came is durable. How a stream is cut into reads changes nothing. Not here: what is durable (see `raw_log`) and what the frames mean (see
 //! `pipeline`).
 
 use std::net::{IpAddr, SocketAddr};
@@ -36,6 +36,8 @@ pub struct Parts {
     pub connection: u64,
     /// Parts of its playbacks, in order.
     pub parts: Vec<PlaybackPart>,
+    /// Told when these, and so all before, are durable and counted.
+    pub durable: Option<oneshot::Sender<()>>,
 }
 
 /// What the listener is told.
@@ -49,7 +51,7 @@ pub struct Rules {
     pub open: bool,
     /// Connections at once.
     pub connections_max: usize,
-    /// A silent connection is closed after this.
+    /// A connection that brings less than a frame is closed after this.
     pub idle_timeout: Duration,
     /// How long a drain waits for what is still being sent.
     pub drain_timeout: Duration,
@@ -137,6 +139,34 @@ enum End {
     Broken,
 }
 
+/// How long a sender is waited for. Its own waiting for room does not count.
+struct Progress {
+    whole: Duration,
+    patience: Duration,
+    frame_octets: usize,
+    of_frame: usize,
+}
+
+impl Progress {
+    fn new(rules: &Rules) -> Self {
+        Self {
+            whole: rules.idle_timeout,
+            patience: rules.idle_timeout,
+            frame_octets: rules.link.frame_octets,
+            of_frame: 0,
+        }
+    }
+
+    /// Some octets came after some waiting: with a whole frame of them, patience is what it was.
+    fn came(&mut self, octets: usize, waited: Duration) {
+        self.of_frame += octets;
+        self.patience = self.patience.saturating_sub(waited);
+        if self.of_frame >= self.frame_octets {
+            (self.of_frame, self.patience) = (0, self.whole);
+        }
+    }
+}
+
 impl Connection {
     async fn run(self, mut stream: TcpStream) {
         let counters = &self.board.counters;
@@ -154,11 +184,13 @@ impl Connection {
         };
         let mut octets = vec![0u8; READ_OCTETS];
         let mut drain_ends = None;
+        let mut progress = Progress::new(&self.rules);
         let end = loop {
             let patience = match drain_ends {
-                None => self.rules.idle_timeout,
+                None => progress.patience,
                 Some(_) => DRAIN_SILENCE,
             };
+            let waits_since = tokio::time::Instant::now();
             let read = tokio::select! {
                 read = tokio::time::timeout(patience, stream.read(&mut octets)) => read,
                 () = self.drain.cancelled(), if drain_ends.is_none() => {
@@ -177,6 +209,7 @@ impl Connection {
                 Err(_) => break End::Idle,
             };
             count(&counters.octets_in, taken as u64);
+            progress.came(taken, waits_since.elapsed());
             // Waits for room: a sender is held back by what is not durable yet.
             if decoder.send(octets[..taken].to_vec()).await.is_err() {
                 break End::Drained;
@@ -197,7 +230,7 @@ impl Connection {
         }
     }
 
-    /// A thread that decodes what it is sent and hands it on to the writer, and the bits it had when there is no more.
+    /// A thread that decodes what it is sent and hands it on to the writer, and the bits it had when there is no more and all is durable.
     fn start_decoder(&self) -> std::io::Result<(mpsc::Sender<Vec<u8>>, oneshot::Receiver<u64>)> {
         let (reads, mut undecoded) = mpsc::channel::<Vec<u8>>(UNDECODED_READS_MAX);
         let (done, decoded) = oneshot::channel();
@@ -205,7 +238,7 @@ impl Connection {
         let decode = move || {
             give_way(PRODUCTS_GIVE_WAY);
             let hand_on = |parts: Vec<PlaybackPart>| {
-                parts.is_empty() || writer.blocking_send(Parts { connection, parts }).is_ok()
+                parts.is_empty() || writer.blocking_send(Parts { connection, parts, durable: None }).is_ok()
             };
             let mut reader = PlaybackReader::new(link);
             while let Some(octets) = undecoded.blocking_recv() {
@@ -217,7 +250,11 @@ impl Connection {
             }
             let mut parts = Vec::new();
             reader.finish(|part| parts.push(part));
-            hand_on(parts);
+            let (durable, is_durable) = oneshot::channel();
+            // Without a writer nothing more will be: its end is told by itself.
+            if writer.blocking_send(Parts { connection, parts, durable: Some(durable) }).is_ok() {
+                let _ = is_durable.blocking_recv();
+            }
             // Nobody may be waiting any more.
             let _ = done.send(reader.received_bits());
         };

@@ -10,7 +10,7 @@ use std::sync::{Arc, RwLock};
 use std::time::{Duration, Instant};
 
 use tokio::runtime::Handle;
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use tokio_util::sync::CancellationToken;
 
 use telling::{body, picture, taken_back, whole};
@@ -168,10 +168,12 @@ impl Writer {
             let received = runtime.block_on(async { tokio::time::timeout(TICK, parts.recv()).await });
             match received {
                 Ok(Some(first)) => {
-                    let batch = self.gather(first, &mut parts);
+                    let (batch, waiting) = self.gather(first, &mut parts);
                     self.write_until_durable(&batch, runtime, give_up, NUMBERS_AHEAD)?;
                     self.take(&batch);
                     self.bring_up();
+                    // A connection may have gone meanwhile.
+                    waiting.into_iter().for_each(|durable| durable.send(()).unwrap_or(()));
                     self.publish_waiting();
                     self.conclude(&batch, parts.is_empty());
                     last_arrival = Instant::now();
@@ -200,16 +202,17 @@ impl Writer {
         self.write_until_durable(&[], runtime, give_up, 0)
     }
 
-    /// Everything that is waiting, up to the bound of a batch.
-    fn gather(&mut self, first: Parts, parts: &mut mpsc::Receiver<Parts>) -> Vec<Entry> {
-        let mut batch = Vec::new();
+    /// Everything that is waiting, up to the bound of a batch, and who is to be told when it is durable and counted.
+    fn gather(&mut self, first: Parts, parts: &mut mpsc::Receiver<Parts>) -> (Vec<Entry>, Vec<oneshot::Sender<()>>) {
+        let (mut batch, mut waiting) = (Vec::new(), Vec::new());
         let mut octets = 0;
         let mut next = Some(first);
-        while let Some(parts_of) = next {
+        while let Some(mut parts_of) = next {
+            waiting.extend(parts_of.durable.take());
             octets += self.number(parts_of, &mut batch);
             next = if octets < BATCH_OCTETS_MAX { parts.try_recv().ok() } else { None };
         }
-        batch
+        (batch, waiting)
     }
 
     /// Gives the playbacks of a connection their numbers.

@@ -17,6 +17,9 @@ use super::mission::{Mission, MissionConfig};
 /// Grid of simulation and ancillary data, s.
 const GRID_S: u32 = 20;
 
+/// Names of the files of a case.
+pub const CASE_FILES: [&str; 4] = ["case.toml", "simulation.csv", "ancillary.csv", "events.csv"];
+
 /// The files of a case whose recording is the mission's dump: names and texts.
 ///
 /// # Errors
@@ -24,12 +27,8 @@ const GRID_S: u32 = 20;
 pub fn case_files(mission: &Mission, id: &str, dump: &str) -> Result<Vec<(&'static str, String)>, Vec<SimulateError>> {
     let config = mission.config();
     let believed = Mission::new(MissionConfig { forces: ForceModel::default(), ..config.clone() })?;
-    Ok(vec![
-        ("case.toml", case_toml(config, id, dump)),
-        ("simulation.csv", simulation_csv(&believed)),
-        ("ancillary.csv", ancillary_csv(&believed)),
-        ("events.csv", events_csv(config)),
-    ])
+    let texts = [case_toml(config, id, dump), simulation_csv(&believed), ancillary_csv(&believed), events_csv(config)];
+    Ok(CASE_FILES.into_iter().zip(texts).collect())
 }
 
 fn grid(config: &MissionConfig) -> impl Iterator<Item = f64> {

@@ -75,6 +75,36 @@ async fn half_a_frame_and_silence_is_counted_and_the_connection_closed() {
     assert_the_next_sender_is_served(&running).await;
 }
 
+/// An octet now and then is no frame: sixteen such would hold the port.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_sender_that_drips_is_closed_as_a_silent_one_is() {
+    let running = start_with(|config| config.ingest.idle_timeout = Duration::from_millis(300)).await;
+    let mut stream = TcpStream::connect(running.service.ingest_address).await.unwrap();
+    let drips = async {
+        while stream.write_all(&[0]).await.is_ok() {
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    };
+    tokio::time::timeout(PATIENCE, drips).await.expect("closed in time");
+    let metrics = reqwest::get(running.url("/metrics")).await.unwrap().text().await.unwrap();
+    assert!(metrics.contains("oare_connections_idle_total 1"), "{metrics}");
+    assert_the_next_sender_is_served(&running).await;
+}
+
+/// A sender that says it is done, and waits for the end of file, knows then that nothing of it can be lost.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_connection_is_closed_when_all_it_brought_is_durable() {
+    let running = start().await;
+    let octets = dump(20_000, 40_000, 0);
+    let mut stream = TcpStream::connect(running.service.ingest_address).await.unwrap();
+    stream.write_all(&octets).await.unwrap();
+    stream.shutdown().await.unwrap();
+    let closed = tokio::time::timeout(PATIENCE, stream.read(&mut [0u8; 16])).await.expect("closed in time");
+    assert_eq!(closed.unwrap(), 0);
+    let status = running.get("/status").await;
+    assert_eq!(status["ingest"]["frames_durable"], octets.len() / 1119, "{status}");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn frames_of_another_spacecraft_are_refused_by_that_reason() {
     let running = start().await;

@@ -128,7 +128,13 @@ fn what_a_command_cannot_use_is_told_and_no_input_is_written_over() {
     let simulate = ["simulate", "--config", "mission.toml", "--out", "a.dump", "--case", "case"];
     assert!(oare(&dir, &simulate).status.success());
     let dump = std::fs::read(dir.path().join("a.dump")).unwrap();
-    let cases: [(&[&str], i32, &str); 7] = [
+    std::fs::write(dir.path().join("windows.csv"), &dump).unwrap();
+    std::fs::write(dir.path().join("b.instrument.json"), push).unwrap();
+    let cases: [(&[&str], i32, &str); 11] = [
+        (&["process", "windows.csv", "--out", "."], 2, "windows.csv: that is an input"),
+        (&["process", "a.dump", "--calibration", "calibration.json", "--out", "."], 2, "calibration.json"),
+        (&["simulate", "--config", "mission.toml", "--out", "mission.toml"], 2, "mission.toml: that is an input"),
+        (&["simulate", "--config", "b.instrument.json", "--out", "b.dump"], 2, "b.instrument.json: that is an input"),
         (&["process", "a.dump", "random.bin", "--out", "products"], 3, "random.bin: no frame in 50000 octets"),
         (&["diagnose", "case", "--out", "a.dump"], 2, "a file of the case"),
         (&["simulate", "--config", "no.toml", "--out", "b.dump"], 2, "no.toml"),
@@ -143,7 +149,10 @@ fn what_a_command_cannot_use_is_told_and_no_input_is_written_over() {
         assert_eq!(output.status.code(), Some(code), "{arguments:?}: {told}");
         assert!(told.contains(named), "{arguments:?}: {told}");
     }
-    assert_eq!(std::fs::read(dir.path().join("a.dump")).unwrap(), dump);
+    for unharmed in ["a.dump", "windows.csv"] {
+        assert_eq!(std::fs::read(dir.path().join(unharmed)).unwrap(), dump);
+    }
+    assert_eq!(std::fs::read(dir.path().join("mission.toml")).unwrap(), push.as_bytes());
 }
 
 #[tokio::test(flavor = "multi_thread")]

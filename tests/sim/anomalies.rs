@@ -4,11 +4,12 @@ use oare_ground::pipeline::calibration::{Anomaly, AnomalyKind};
 use oare_ground::simulate::Fault;
 use oare_ground::simulate::mission::MissionConfig;
 use oare_ground::simulate::trajectory::AttitudeHold;
+use oare_ground::telemetry::{Mode, Range};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::flown::{Flown, fly, seeds};
+use super::flown::{Flown, fly, fly_altered, seeds};
 
 const DAY_S: u32 = 86_400;
 
@@ -233,4 +234,40 @@ fn a_short_misreport_is_told_and_leaves_no_wrong_value() {
         }
         assert!(seen > 12, "{seen}");
     }
+}
+
+/// A range is named axis by axis: of one alone, or two, over half an hour, with no calibration in it.
+#[test]
+fn a_range_that_one_axis_misreports_is_told_and_leaves_no_wrong_value() {
+    let [from_s, to_s] = [21_000.0, 23_400.0];
+    let altered: Vec<(Range, Vec<usize>)> = [Range::A, Range::B]
+        .into_iter()
+        .flat_map(|range| [vec![0], vec![1], vec![2], vec![0, 1], vec![1, 2]].map(|axes| (range, axes)))
+        .collect();
+    altered.into_par_iter().for_each(|(range, axes)| {
+        let flown = fly_altered(MissionConfig::sts65(11, 12.0), |mut record| {
+            if (from_s..to_s).contains(&record.clock.seconds()) && record.mode == Mode::Normal {
+                axes.iter().for_each(|axis| record.ranges[*axis] = range);
+            }
+            Some(record)
+        });
+        let told: Vec<&Anomaly> =
+            flown.derived.anomalies.iter().filter(|a| a.kind == AnomalyKind::RangeMisreport).collect();
+        assert_eq!(told.len(), 1, "{range:?} {axes:?}: {told:#?}");
+        assert!((told[0].from.seconds() - from_s).abs() < 30.0 && (told[0].to.seconds() - to_s).abs() < 30.0);
+        assert_eq!(told[0].axes.iter().map(|axis| axis.index()).collect::<Vec<_>>(), axes, "{}", told[0].sentence);
+        let near = from_s - 200.0..to_s + 200.0;
+        let mut seen = 0;
+        for product in flown.products().filter(|product| near.contains(&product.start.seconds())) {
+            let truth = flown.truth.get(&(product.start.seconds() as u32));
+            let (Some(found), Some(truth)) = (&product.acceleration, truth) else { continue };
+            for i in 0..3 {
+                let error = found.sigma_ng.0[i].hypot(found.sigma_sys_ng.0[i]);
+                let off = (found.trimmed_ng.0[i] - truth.body_ng[i]) / error;
+                assert!(off.abs() < 6.0, "{range:?} {axes:?} {:?} axis {i}: {off} sigma", product.start);
+                seen += 1;
+            }
+        }
+        assert!(seen > 200, "{seen}");
+    });
 }

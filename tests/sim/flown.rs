@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use oare_ground::ingest::wire::record::Record;
 use oare_ground::pipeline::archive::Archive;
 use oare_ground::pipeline::calibration::{self, Derived};
 use oare_ground::pipeline::window::{Window, Windows, windows};
 use oare_ground::pipeline::{Product, Settings, derive};
 use oare_ground::simulate::truth::{TrueWindow, TruthBuilder};
 use oare_ground::simulate::{Mission, MissionConfig};
+use oare_ground::telemetry::AccRecord;
 
 /// A mission's windows, what is derived from them, and the truth.
 pub struct Flown {
@@ -32,13 +34,24 @@ impl Flown {
 
 /// Flies a mission.
 pub fn fly(config: MissionConfig) -> Flown {
+    fly_altered(config, Some)
+}
+
+/// Flies a mission whose second records come down altered, or not at all.
+pub fn fly_altered(config: MissionConfig, alter: impl Fn(AccRecord) -> Option<AccRecord>) -> Flown {
     let mission = Mission::new(config).unwrap_or_else(|problems| panic!("{problems:?}"));
     let (mut archive, mut builder, mut truth) = (Archive::default(), TruthBuilder::default(), BTreeMap::new());
     let mut sequence = 0u16;
     for second in mission.fly() {
         truth.extend(builder.take(&second).map(|window| (window.start_clock_s, window)));
         for sent in second.sent.iter().filter(|sent| sent.damage.is_none()) {
-            archive.add(sent.record.clone(), sequence);
+            let record = match sent.record.clone() {
+                Record::Acc(record) => alter(record).map(Record::Acc),
+                other => Some(other),
+            };
+            if let Some(record) = record {
+                archive.add(record, sequence);
+            }
             sequence = sequence.wrapping_add(1) & 0x3fff;
         }
     }

@@ -255,6 +255,8 @@ pub(super) fn clock(c: &mut Collector) {
         &[&|g| s.grid_s[g] - start, &|g| (s.grid_s[g] - start).powi(2)],
     );
     c.family("time", "from an instant of no log on", creeps(s));
+    c.family("time", "the whole record, more and more", growths(s));
+    c.family("time", "the whole record, less and less", hyperbolas(s));
     for hours in [6.0, 8.0, 12.0, 24.0, 48.0] {
         let rate = std::f64::consts::TAU / (hours * 3600.0);
         c.several(
@@ -286,6 +288,28 @@ fn lines(revolutions: f64) -> Vec<Vec<f64>> {
     let quick = (1..=40).map(|i| STEP * f64::from(i)).filter(|cycles| *cycles > last);
     let quick = quick.chain([2.5, 8.0, 12.0, 16.0]).map(|cycles| vec![cycles]);
     slow.chunks(2).map(<[f64]>::to_vec).chain(quick).collect()
+}
+
+/// What grows as fast as it is large.
+fn growths(s: &Scene) -> Vec<(String, Vec<f64>)> {
+    let [start, end] = s.span_s();
+    let growth = |share: f64| {
+        let tau_s = share * (end - start);
+        let grown = s.clock_s().iter().map(|t| ((t - end) / tau_s).exp()).collect();
+        (format!("exp((t - {end:.0} s)/{tau_s:.0} s)"), grown)
+    };
+    [0.05, 0.09, 0.16, 0.28, 0.5].map(growth).to_vec()
+}
+
+/// What falls from the beginning on slower than an exponential: 1/t, from some time before.
+fn hyperbolas(s: &Scene) -> Vec<(String, Vec<f64>)> {
+    let [start, end] = s.span_s();
+    let hyperbola = |share: f64| {
+        let before_s = share * (end - start);
+        let fallen = s.clock_s().iter().map(|t| (1.0 + (t - start) / before_s).recip()).collect();
+        (format!("1/(1 + (t - {start:.0} s)/{before_s:.0} s)"), fallen)
+    };
+    [0.02, 0.05, 0.12, 0.3].map(hyperbola).to_vec()
 }
 
 /// What creeps with the logarithm of time, as materials do under a load, from an instant of no log on.

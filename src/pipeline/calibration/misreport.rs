@@ -2,7 +2,7 @@
 //!
 //! Ranges differ by factors of ten and more in what a count means, so scatter and level of a window in counts tell which one
 //! it was taken in: the scatter must be that of the mission, the level within a few micro-g of the bias of the range. Both are
-//! weighed for the range reported against every other, window by window for the span, second by second for its ends.
+//! weighed for the range reported against every other, axis by axis, window by window for the span, second by second for its ends.
 
 use super::anomaly::{Anomaly, AnomalyKind, RangeCorrection};
 use super::apply::Calibration;
@@ -22,6 +22,12 @@ const MANOEUVRE_NG: f64 = 20_000.0;
 const MANOEUVRE_SHARE: f64 = 0.015;
 /// A window speaks for another range when its weight of evidence (natural logarithm) is above this.
 const EVIDENCE_MIN: f64 = 20.0;
+/// And hints at it when that of the axes that have any is above this: one axis alone, or neighbouring ranges, say no more. A manoeuvre may do the same, for as long as it lasts: so
+/// many windows, three of four that are there, are 25 minutes; and of all together so much is asked.
+const HINT_MIN: f64 = 2.5;
+const HINTS_MIN: usize = 60;
+const HINTS_SHARE: f64 = 0.75;
+const EVIDENCE_OF_HINTS: f64 = 360.0;
 /// Windows that make a span, or the evidence of fewer that does: a window taken in C and named A, or the reverse, has fifty, and of those
 /// named rightly none has ten.
 const WINDOWS_MIN: usize = 3;
@@ -85,12 +91,12 @@ fn usual_scatter_ng(windows: &[(i64, &Window)], resolution_ng: &[[f64; 3]; 3]) -
 }
 
 /// What speaks against the ranges reported, at most: no other range explains a window better than perfectly.
-fn against(usual: &Usual<'_>, window: &Window) -> Option<f64> {
-    let mut total = 0.0;
-    for axis in Axis::ALL {
-        total -= usual.favour(&seen(window, axis)?, window.axes[axis.index()]?.range, LEVEL_NG)?;
-    }
-    Some(total)
+fn against(usual: &Usual<'_>, window: &Window) -> f64 {
+    let of_axis = |axis| {
+        let range = window.axes[Axis::index(axis)]?.range;
+        usual.favour(&seen(window, axis)?, range, LEVEL_NG)
+    };
+    Axis::ALL.into_iter().filter_map(of_axis).map(|favour| (-favour).max(0.0)).sum()
 }
 
 fn seen(window: &Window, axis: Axis) -> Option<Seen> {
@@ -104,29 +110,40 @@ fn seen(window: &Window, axis: Axis) -> Option<Seen> {
     })
 }
 
-/// One window's evidence for a range: per axis, log likelihood over that of the range reported.
-fn evidence(usual: &Usual<'_>, window: &Window, actual: Range) -> Option<[f64; 3]> {
-    let mut of_axes = [0.0; 3];
-    for axis in Axis::ALL {
-        let reported = window.axes[axis.index()]?.range;
-        if reported == actual {
-            continue;
-        }
-        let seen = seen(window, axis)?;
-        of_axes[axis.index()] = usual.favour(&seen, actual, LEVEL_NG)? - usual.favour(&seen, reported, LEVEL_NG)?;
-    }
-    Some(of_axes)
+/// One window's evidence for a range: per axis, log likelihood over that of the range reported; nothing of an axis that cannot say.
+fn evidence(usual: &Usual<'_>, window: &Window, actual: Range) -> [f64; 3] {
+    Axis::ALL.map(|axis| {
+        let reported = window.axes[axis.index()].map(|of_axis| of_axis.range).filter(|reported| *reported != actual);
+        let of_axis = reported.zip(seen(window, axis)).and_then(|(reported, seen)| {
+            Some(usual.favour(&seen, actual, LEVEL_NG)? - usual.favour(&seen, reported, LEVEL_NG)?)
+        });
+        of_axis.unwrap_or(0.0)
+    })
 }
 
-/// The range that a window speaks for where it is another than the one reported, with the evidence of its axes.
+/// Of the axes that speak for it: ranges are named axis by axis.
+fn total(of_axes: &[f64; 3]) -> f64 {
+    of_axes.iter().map(|of_axis| of_axis.max(0.0)).sum()
+}
+
+/// The range that a window hints at where it is another than the one reported, with the evidence of its axes.
 fn best_other(usual: &Usual<'_>, window: &Window) -> Option<(Range, [f64; 3])> {
-    against(usual, window).filter(|most| *most > EVIDENCE_MIN)?;
-    let total = |of_axes: &[f64; 3]| of_axes.iter().sum::<f64>();
+    if against(usual, window) <= HINT_MIN {
+        return None;
+    }
     Range::ALL
         .into_iter()
-        .filter_map(|range| evidence(usual, window, range).map(|of_axes| (range, of_axes)))
+        .map(|range| (range, evidence(usual, window, range)))
         .max_by(|a, b| total(&a.1).total_cmp(&total(&b.1)))
-        .filter(|(_, of_axes)| total(of_axes) > EVIDENCE_MIN)
+        .filter(|(_, of_axes)| total(of_axes) > HINT_MIN)
+}
+
+/// A window that hints at another range.
+struct Hint {
+    cell: i64,
+    actual: Range,
+    of_axes: [f64; 3],
+    ln_ratio: f64,
 }
 
 /// A run of windows that speak for another range.
@@ -175,31 +192,58 @@ pub fn find(
     let normal = normal(windows, known_at);
     let Some(scatter_ng) = usual_scatter_ng(&normal, &calibration.resolution_ng) else { return Vec::new() };
     let usual = Usual { scatter_ng, calibration };
-    let mut spans: Vec<Span> = Vec::new();
-    let speaking = map(&normal, |(cell, window)| {
+    let hints: Vec<Hint> = map(&normal, |(cell, window)| {
         let (actual, of_axes) = best_other(&usual, window)?;
-        Some((*cell, actual, of_axes, ln_scatter_ratio(&usual, window)))
-    });
-    for (cell, actual, of_axes, ln_ratio) in speaking.into_iter().flatten() {
+        Some(Hint { cell: *cell, actual, of_axes, ln_ratio: ln_scatter_ratio(&usual, window, &of_axes) })
+    })
+    .into_iter()
+    .flatten()
+    .collect();
+    let there = |cell: i64| normal.partition_point(|(of_window, _)| *of_window < cell);
+    let lasts = |span: &Span| {
+        let windows = there(span.cells[1] + 1) - there(span.cells[0]);
+        let is_long = span.windows >= HINTS_MIN && span.windows as f64 >= HINTS_SHARE * windows as f64;
+        is_long && total(&span.of_axes) >= EVIDENCE_OF_HINTS
+    };
+    let mut spans = runs(hints.iter());
+    spans.retain(lasts);
+    let is_in_one = |hint: &Hint| spans.iter().any(|span| (span.cells[0]..=span.cells[1]).contains(&hint.cell));
+    // A window half inside of a span speaks for one axis and against another: in a short one all must agree.
+    let of_all = |of_axes: &[f64; 3]| of_axes.iter().sum::<f64>();
+    let mut short = runs(hints.iter().filter(|hint| of_all(&hint.of_axes) > EVIDENCE_MIN && !is_in_one(hint)));
+    short.retain(|span| span.windows >= WINDOWS_MIN || of_all(&span.of_axes) >= EVIDENCE_OF_FEW);
+    spans.extend(short);
+    spans.sort_by_key(|span| span.cells);
+    spans.iter().filter_map(|span| settle_span(archive, &usual, windows, span, known_at)).collect()
+}
+
+/// Runs of windows for one range.
+fn runs<'h>(hints: impl Iterator<Item = &'h Hint>) -> Vec<Span> {
+    let mut spans: Vec<Span> = Vec::new();
+    for Hint { cell, actual, of_axes, ln_ratio } in hints {
         match spans.last_mut() {
-            Some(span) if span.actual == actual && cell - span.cells[1] <= CELLS_BETWEEN_MAX => {
-                span.cells[1] = cell;
+            Some(span) if span.actual == *actual && cell - span.cells[1] <= CELLS_BETWEEN_MAX => {
+                span.cells[1] = *cell;
                 span.windows += 1;
-                span.ln_ratio.push(ln_ratio);
+                span.ln_ratio.push(*ln_ratio);
                 span.of_axes.iter_mut().zip(of_axes).for_each(|(sum, one)| *sum += one);
             }
-            _ => spans.push(Span { cells: [cell, cell], actual, windows: 1, of_axes, ln_ratio: vec![ln_ratio] }),
+            _ => spans.push(Span {
+                cells: [*cell; 2],
+                actual: *actual,
+                windows: 1,
+                of_axes: *of_axes,
+                ln_ratio: vec![*ln_ratio],
+            }),
         }
     }
     spans
-        .iter()
-        .filter(|span| span.windows >= WINDOWS_MIN || span.of_axes.iter().sum::<f64>() >= EVIDENCE_OF_FEW)
-        .filter_map(|span| settle_span(archive, &usual, windows, span, known_at))
-        .collect()
 }
 
-fn ln_scatter_ratio(usual: &Usual<'_>, window: &Window) -> f64 {
+/// Scatter in the range reported over the usual one, of the axes that speak for another, on the mean.
+fn ln_scatter_ratio(usual: &Usual<'_>, window: &Window, of_axes: &[f64; 3]) -> f64 {
     let ratios: Vec<f64> = (0..3)
+        .filter(|axis| of_axes[*axis] > 0.0)
         .filter_map(|axis| {
             let seen = window.axes[axis]?;
             let resolution = usual.calibration.resolution_ng[axis][seen.range.index()];
@@ -247,14 +291,15 @@ fn settle_span(
     let letters: Vec<String> = axes.iter().map(|axis| axis.letter().to_uppercase()).collect();
     let lasts_s = (to.tenths() - from.tenths()) as f64 / 10.0;
     let lasts = if lasts_s < 3600.0 { format!("{lasts_s:.0} s") } else { format!("{:.2} h", lasts_s / 3600.0) };
+    let (times, than) = if value >= 1.0 { (value, "less") } else { (value.recip(), "more") };
     let sentence = format!(
         "For {lasts} the records say range {} in {} while the sensor was in range {}: the samples scatter {} times \
-         less than they would; the windows are calibrated in range {} and flagged range_corrected, those at the edges have no \
+         {than} than they would; the windows are calibrated in range {} and flagged range_corrected, those at the edges have no \
          value.",
         reported_range.letter(),
         letters.join(", "),
         span.actual.letter(),
-        if value >= 10.0 { format!("{value:.0}") } else { format!("{value:.3}") },
+        if times >= 10.0 { format!("{times:.0}") } else { format!("{times:.3}") },
         span.actual.letter(),
     );
     let anomaly = Anomaly {

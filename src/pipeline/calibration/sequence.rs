@@ -14,11 +14,19 @@ const STEP_TENTHS_MAX: i64 = 500;
 /// The next step of a sequence starts within this of the end of the one before, tenths of a second.
 const NEXT_TENTHS_MAX: i64 = 600;
 
+/// Length of a position of the two-position sequence, and of the turn before the second, tenths of a second.
+pub const POSITION_TENTHS: i64 = 500;
+const TURN_TENTHS: i64 = 250;
+
 /// Seconds in which the table rests, or turns at its constant rate.
 #[derive(Debug, Clone)]
 pub struct Hold<'a> {
     /// Its seconds, in order.
     pub records: Vec<&'a AccRecord>,
+    /// When the step began, where what is recorded tells, also of a step whose first seconds are lost.
+    pub began: Option<Clock>,
+    /// When it ended, where the second after it is recorded.
+    pub ended: Option<Clock>,
     /// Hash of them.
     pub digest: u64,
     /// Adaptive trimmed means of the axes, counts spread over their width; None without a sample.
@@ -73,9 +81,10 @@ impl Hold<'_> {
         self.records.iter().map(|r| f64::from(r.temperature_c)).sum::<f64>() / self.records.len() as f64
     }
 
-    /// Samples of an axis that are not at the rail, each with its tenths of a second since the start of the step.
+    /// Samples of an axis that are not at the rail, each with its tenths of a second since the start of the step, or since its first second
+    /// where nothing tells that.
     pub fn samples(&self, axis: Axis) -> impl Iterator<Item = (u16, i16)> + '_ {
-        let start = self.start().tenths();
+        let start = self.began.unwrap_or_else(|| self.start()).tenths();
         self.records.iter().flat_map(move |record| {
             record.counts.iter().enumerate().filter_map(move |(n, sample)| {
                 let count = sample[axis.index()];
@@ -116,6 +125,7 @@ impl Hold<'_> {
 
     fn digest(&self) -> u64 {
         let mut hasher = DefaultHasher::new();
+        self.began.hash(&mut hasher);
         for record in &self.records {
             (record.clock, record.counts.as_flattened(), record.temperature_c.to_bits(), record.ranges, record.quiet)
                 .hash(&mut hasher);
@@ -135,17 +145,26 @@ pub fn holds<'a>(
     let cells = cells_of(windows, |window| window.quality.contains(Quality::TABLE_MOVING));
     let mut holds: Vec<Hold<'a>> = Vec::new();
     let mut open = false;
+    let mut before: Option<Clock> = None;
     for record in cells.flat_map(|cell| archive.cell(cell)) {
-        if !is_of_a_hold(record) {
-            open = false;
-            continue;
-        }
+        let is_next = before.is_some_and(|clock| record.clock == clock.plus_tenths(RECORD_TENTHS));
+        before = Some(record.clock);
+        let of_a_hold = is_of_a_hold(record);
         match holds.last_mut() {
-            Some(hold) if open && continues(hold, record) => hold.records.push(record),
-            _ => holds.push(Hold { records: vec![record], digest: 0, means: [None; 3] }),
+            Some(hold) if open && of_a_hold && continues(hold, record) => {
+                hold.records.push(record);
+                continue;
+            }
+            Some(hold) if open && is_next => hold.ended = Some(record.clock),
+            _ => {}
         }
-        open = true;
+        open = of_a_hold;
+        if of_a_hold {
+            let began = is_next.then_some(record.clock);
+            holds.push(Hold { records: vec![record], began, ended: None, digest: 0, means: [None; 3] });
+        }
     }
+    time_positions(&mut holds);
     for hold in &mut holds {
         hold.digest = hold.digest();
         let known = kept.and_then(|kept| kept.get(&hold.digest));
@@ -155,6 +174,26 @@ pub fn holds<'a>(
         };
     }
     holds
+}
+
+/// When a position began whose first second is lost, by its end or by the position before it: each is as long as the sequence has it.
+fn time_positions(holds: &mut [Hold<'_>]) {
+    for place in 0..holds.len() {
+        if holds[place].began.is_some() || holds[place].mode() != Mode::Bias {
+            continue;
+        }
+        let by_its_end = holds[place].ended.map(|ended| ended.plus_tenths(-POSITION_TENTHS));
+        let by_the_one_before = || {
+            let normal = holds.get(place.checked_sub(1)?)?;
+            let is_pair = normal.step() == Step::Normal && next_step(holds, place - 1, Step::Opposite).is_some();
+            let ended = normal.ended.or_else(|| normal.began.map(|began| began.plus_tenths(POSITION_TENTHS)));
+            ended.filter(|_| is_pair).map(|ended| ended.plus_tenths(TURN_TENTHS))
+        };
+        let (start, last) = (holds[place].start(), holds[place].last());
+        // A sequence of other lengths is not timed by these.
+        let holds_all = |began: &Clock| *began <= start && last < began.plus_tenths(POSITION_TENTHS);
+        holds[place].began = by_its_end.filter(holds_all).or_else(|| by_the_one_before().filter(holds_all));
+    }
 }
 
 /// Whether a second belongs to a hold: the table rests, or turns at its constant rate.

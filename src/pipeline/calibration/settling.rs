@@ -4,7 +4,7 @@
 //! and the decay), all positions together choose tau, and the mean of S over its error says whether there is a transient at
 //! all. What the trimmed mean would have been left with is the skew.
 
-use super::sequence::Hold;
+use super::sequence::{Hold, POSITION_TENTHS};
 use crate::math::robust::{MAD_TO_SIGMA, TrimLaw, median};
 use crate::math::shared_work::map;
 use crate::telemetry::Axis;
@@ -22,7 +22,7 @@ const CORRELATION: f64 = 1.5;
 /// The same with Huber's loss of efficiency.
 const INFLATION: f64 = 1.1 * CORRELATION;
 /// Length of a position, s.
-const POSITION_S: f64 = 50.0;
+const POSITION_S: f64 = POSITION_TENTHS as f64 / 10.0;
 /// Residuals beyond so many scatters lose weight.
 const HUBER: f64 = 1.5;
 
@@ -72,7 +72,7 @@ struct Position {
 
 impl Position {
     fn new(hold: &Hold<'_>, axis: Axis) -> Option<Self> {
-        let start = hold.start().tenths();
+        let start = hold.began?.tenths();
         let seconds: Vec<(f64, f64)> = hold
             .records
             .iter()
@@ -151,7 +151,7 @@ struct Tau {
     ln_sigma: f64,
 }
 
-/// The transients of Y and Z in their common opposite positions, with one tau; None without a position.
+/// The transients of Y and Z in their common opposite positions, with one tau; None without a position of which it is known when it began.
 pub fn find(holds: &[&Hold<'_>], law: &TrimLaw, samples_min: usize) -> Option<[Transient; 2]> {
     let axes = [Axis::Y, Axis::Z];
     let mut positions = axes.map(|axis| holds.iter().filter_map(|hold| Position::new(hold, axis)).collect::<Vec<_>>());

@@ -91,7 +91,7 @@ impl Pair<'_, '_> {
         self.normal.target() == 2 && self.normal.range(Axis::Y) == Range::C
     }
 
-    /// The bias of an axis with the transient taken away; `factor` is the noise factor, `half_drift` the variance of half the
+    /// The bias of an axis with the transient taken away, `None` also where nothing tells when that began; `factor` is the noise factor, `half_drift` the variance of half the
     /// signal's change between the positions, squared counts.
     pub fn measure(
         &self,
@@ -105,7 +105,10 @@ impl Pair<'_, '_> {
         let at_zero = self.normal.mean(axis, least)?;
         let raw = self.opposite.mean(axis, least)?;
         let freed = match transient {
-            Some(transient) => self.opposite.mean_without(axis, law, least, Some(&|t_s| transient.counts(t_s)))?,
+            Some(transient) => {
+                self.opposite.began?;
+                self.opposite.mean_without(axis, law, least, Some(&|t_s| transient.counts(t_s)))?
+            }
             None => raw,
         };
         let error = |mean: &TrimmedMean| {

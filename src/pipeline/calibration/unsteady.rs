@@ -243,12 +243,8 @@ fn walk(readings: &[Reading]) -> f64 {
     let mut used: Vec<usize> = readings.iter().map(|reading| reading.bias).collect();
     used.sort_unstable();
     used.dedup();
-    let columns = used.len() + 2;
-    if readings.len() < columns + 2 {
-        return 0.0;
-    }
     let middle_s = readings.iter().map(|r| r.clock_s).sum::<f64>() / readings.len() as f64;
-    let design = DMatrix::from_fn(readings.len(), columns, |row, column| {
+    let design = DMatrix::from_fn(readings.len(), used.len() + 2, |row, column| {
         let reading = &readings[row];
         match column.checked_sub(used.len()) {
             None => f64::from(u8::from(used[column] == reading.bias)),
@@ -256,6 +252,7 @@ fn walk(readings: &[Reading]) -> f64 {
             Some(_) => reading.sign * (reading.clock_s - middle_s) / POSITIONS_S,
         }
     });
+    let Some(design) = independent(design).filter(|design| readings.len() >= design.ncols() + 2) else { return 0.0 };
     let values = DVector::from_iterator(readings.len(), readings.iter().map(|reading| reading.ng));
     let typical = readings.iter().map(|reading| reading.variance_ng2).sum::<f64>() / readings.len() as f64;
     let likelihood = |half_variance: f64| ln_likelihood(readings, &design, &values, half_variance);
@@ -268,6 +265,15 @@ fn walk(readings: &[Reading]) -> f64 {
         Some((variance, likelihood)) if likelihood - steady > LN_RATIO_MIN => variance,
         _ => 0.0,
     }
+}
+
+/// Columns that span the same, without those of which nothing is left: a level common to all biases is the signal's where no turn
+/// reverses an axis. A ridge in their place would weigh the biases, the more the quieter the readings are.
+fn independent(design: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let svd = design.svd(true, false);
+    let least = 1e-9 * svd.singular_values.max();
+    let kept: Vec<usize> = (0..svd.singular_values.len()).filter(|n| svd.singular_values[*n] > least).collect();
+    svd.u.map(|u| u.select_columns(&kept))
 }
 
 /// Restricted likelihood of the readings with a walk: what their differences say, whatever the biases and the line.
@@ -289,13 +295,38 @@ fn ln_likelihood(
     let lower = root.l();
     let whitened = lower.solve_lower_triangular(design)?;
     let target = lower.solve_lower_triangular(values)?;
-    // A level common to all biases and the signal's sign leave one direction undetermined: a ridge takes it.
-    let mut normal = whitened.transpose() * &whitened;
-    let ridge = 1e-9 * normal.diagonal().max();
-    (0..normal.nrows()).for_each(|n| normal[(n, n)] += ridge);
-    let normal = normal.cholesky()?;
+    let normal = (whitened.transpose() * &whitened).cholesky()?;
     let right = whitened.transpose() * &target;
     let explained = right.dot(&normal.solve(&right));
     let ln_determinant = |l: &DMatrix<f64>| 2.0 * l.diagonal().iter().map(|x| x.ln()).sum::<f64>();
     Some(-0.5 * (ln_determinant(&lower) + ln_determinant(&normal.l()) + target.norm_squared() - explained))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Readings to a nanog of a signal that swings with the orbit, behind biases of up to 141,000 ng.
+    #[test]
+    fn a_large_bias_makes_no_quiet_record_unsteady() {
+        let signal_ng = |t: f64| 500.0 * (1.16e-3 * t).sin();
+        let bias_ng = [-9300.0, -9200.0, 5600.0, 7600.0, 14_600.0, 141_000.0, -9300.0];
+        let reading = |clock_s: f64, variance_ng2: f64, bias: usize, sign: f64| Reading {
+            clock_s,
+            ng: bias_ng[bias] + sign * signal_ng(clock_s),
+            variance_ng2,
+            bias,
+            sign,
+        };
+        let mut readings = Vec::new();
+        for bias in 0..6 {
+            let (start_s, variance_ng2) = (150.0 * bias as f64, [0.36, 80.0, 7700.0][bias % 3]);
+            readings.push(reading(start_s + 25.0, variance_ng2, bias, 1.0));
+            readings.push(reading(start_s + 100.0, variance_ng2, bias, if bias < 3 { -1.0 } else { 1.0 }));
+        }
+        let around = (0..5).map(|n| 50.0 * f64::from(n) - 250.0).chain((0..4).map(|n| 950.0 + 50.0 * f64::from(n)));
+        readings.extend(around.map(|clock_s| reading(clock_s, 0.36, SHARED_BIAS, 1.0)));
+        let half_change_ng = walk(&readings).sqrt();
+        assert!((1.0..30.0).contains(&half_change_ng), "{half_change_ng}");
+    }
 }

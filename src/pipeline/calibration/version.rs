@@ -98,7 +98,8 @@ fn configured(correction: f64, settings: &Settings) -> Scale {
 
 /// The transients, when either axis shows one.
 fn transients(pairs: &[&Pair<'_, '_>], settings: &Settings) -> Option<[Transient; 2]> {
-    let holds: Vec<_> = pairs.iter().filter(|pair| pair.settles()).map(|pair| pair.opposite).collect();
+    let opposite = pairs.iter().filter(|pair| pair.settles()).map(|pair| pair.opposite);
+    let holds: Vec<_> = opposite.filter(|hold| hold.began.is_some()).collect();
     let found = settling::find(&holds, &settings.window.trim, settings.window.samples_min)?;
     found.iter().any(Transient::is_real).then_some(found)
 }
