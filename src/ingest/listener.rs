@@ -1,8 +1,8 @@
 //! The dump port: connections in, parts of playbacks out to the one writer.
 //!
 //! A connection is read by a task and decoded by a thread of its own that gives way to those who answer. It never writes to a
-//! sender; it closes its end once all that came is durable. How a stream is cut into reads changes nothing. Not here: what is durable (see `raw_log`) and what the frames mean (see
-//! `pipeline`).
+//! sender; it closes its end once all that came is durable. How a stream is cut into reads changes nothing. Not here: what is
+//! durable (see `raw_log`) and what the frames mean (see `pipeline`).
 
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;

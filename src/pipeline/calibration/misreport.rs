@@ -22,8 +22,9 @@ const MANOEUVRE_NG: f64 = 20_000.0;
 const MANOEUVRE_SHARE: f64 = 0.015;
 /// A window speaks for another range when its weight of evidence (natural logarithm) is above this.
 const EVIDENCE_MIN: f64 = 20.0;
-/// And hints at it when that of the axes that have any is above this: one axis alone, or neighbouring ranges, say no more. A manoeuvre may do the same, for as long as it lasts: so
-/// many windows, three of four that are there, are 25 minutes; and of all together so much is asked.
+/// And hints at it when that of the axes that have any is above this: one axis alone, or neighbouring ranges, say no more. A manoeuvre
+/// may do the same, for as long as it lasts: so many windows, three of four that are there, are 25 minutes; and of all together so much is
+/// asked.
 const HINT_MIN: f64 = 2.5;
 const HINTS_MIN: usize = 60;
 const HINTS_SHARE: f64 = 0.75;

@@ -91,8 +91,8 @@ impl Pair<'_, '_> {
         self.normal.target() == 2 && self.normal.range(Axis::Y) == Range::C
     }
 
-    /// The bias of an axis with the transient taken away, `None` also where nothing tells when that began; `factor` is the noise factor, `half_drift` the variance of half the
-    /// signal's change between the positions, squared counts.
+    /// The bias of an axis with the transient taken away, `None` also where nothing tells when that began; `factor` is the noise
+    /// factor, `half_drift` the variance of half the signal's change between the positions, squared counts.
     pub fn measure(
         &self,
         axis: Axis,
