@@ -65,5 +65,7 @@ mod tests {
         for nonsense in ["soon", "NaN", "inf", "1e300", "1994-07-08"] {
             assert!(clock(&mission, "from", nonsense).is_err(), "{nonsense}");
         }
+        assert_eq!(optional_clock(&mission, "as_of", None).unwrap(), None);
+        assert!(optional_clock(&mission, "as_of", Some("")).is_err(), "an empty one is no absent one");
     }
 }
