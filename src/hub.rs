@@ -18,7 +18,7 @@ use std::time::Instant;
 
 use tokio::sync::watch;
 
-use crate::pipeline::product::{Product, Revision};
+use crate::pipeline::product::{Product, Revision, latest};
 use crate::telemetry::AccRecord;
 use crate::units::Clock;
 use journal::Entry;
@@ -258,11 +258,11 @@ impl Hub {
     }
 
     fn note_latest(&self, state: &State) {
-        let newest = state.windows.values().rev().find(|held| held.product.acceleration.is_some());
+        let newest = latest(state.windows.values().rev().map(|held| held.product.as_ref()));
         let mut latest = self.latest.write().expect("no holder panics");
         match newest {
-            Some(held) if latest.is_none_or(|latest| latest.product.revision != held.product.revision) => {
-                *latest = Some(Latest { product: *held.product, since: Instant::now() });
+            Some(product) if latest.is_none_or(|latest| latest.product.revision != product.revision) => {
+                *latest = Some(Latest { product: *product, since: Instant::now() });
             }
             Some(_) => {}
             None => *latest = None,

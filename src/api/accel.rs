@@ -14,7 +14,7 @@ use super::records::ask;
 use crate::hub::wire::{self, BodyAxes, Gap, Time};
 use crate::pipeline::Product;
 use crate::pipeline::calibration::{Calibration, MeanError};
-use crate::pipeline::product::BodyVector;
+use crate::pipeline::product::Component;
 use crate::units::Clock;
 
 /// The latest body-axis value.
@@ -48,7 +48,7 @@ pub async fn accel(State(app): State<Arc<App>>) -> Result<Json<Accel>, Problem> 
     Ok(Json(Accel {
         time: Time::new(&app.mission, latest.product.start),
         frame: "orbiter_body",
-        acceleration: BodyAxes::new(latest.product.acceleration.as_ref()),
+        acceleration: BodyAxes::new(&latest.product.acceleration),
         age_s: (latest.since.elapsed().as_secs_f64() * 1000.0).round() / 1000.0,
         quality: latest.product.quality.to_string(),
         calibration: latest.product.calibration,
@@ -89,9 +89,9 @@ pub struct Bucket {
     pub span: wire::Span,
     /// Windows in it.
     pub count: usize,
-    /// Windows with an acceleration.
+    /// Windows with a value on an axis.
     pub calibrated: usize,
-    /// X, ng; null without a calibrated window.
+    /// X, ng, of the windows with a value on that axis; null without one.
     pub ax_ng: Option<Spread>,
     /// Y, ng.
     pub ay_ng: Option<Spread>,
@@ -160,7 +160,7 @@ pub async fn history(State(app): State<Arc<App>>, Asked(span): Asked<Span>) -> R
     let products = app.hub.history(from, to);
     let buckets = in_buckets(&products, from, to, points);
     let errors = if buckets.iter().all(|products| products.len() == 1) {
-        let alone = |products: &&[Product]| products[0].acceleration.map(|acceleration| acceleration.sigma_ng);
+        let alone = |products: &&[Product]| products[0].acceleration.each(|axis| axis.sigma_ng);
         buckets.iter().map(alone).collect()
     } else {
         let products = products.clone();
@@ -195,41 +195,40 @@ fn in_buckets(products: &[Product], from: Clock, to: Clock, points: usize) -> Ve
 }
 
 /// The standard error of each bucket's mean, where its windows are by the calibration in use.
-fn mean_errors(calibration: Option<&Calibration>, buckets: &[&[Product]]) -> Vec<Option<BodyVector>> {
-    let Some(calibration) = calibration else { return vec![None; buckets.len()] };
-    let by_it = |product: &Product| product.acceleration.is_none() || product.calibration == calibration.version;
+fn mean_errors(calibration: Option<&Calibration>, buckets: &[&[Product]]) -> Vec<[Option<f64>; 3]> {
+    let Some(calibration) = calibration else { return vec![[None; 3]; buckets.len()] };
+    let by_it = |product: &Product| !product.acceleration.is_any() || product.calibration == calibration.version;
     let error = MeanError::new(calibration);
-    buckets.iter().map(|products| products.iter().all(by_it).then(|| error.of(products)).flatten()).collect()
+    let of = |products: &&[Product]| if products.iter().all(by_it) { error.of(products) } else { [None; 3] };
+    buckets.iter().map(of).collect()
 }
 
-fn bucket(app: &App, products: &[Product], error: Option<BodyVector>) -> Bucket {
+fn bucket(app: &App, products: &[Product], error: [Option<f64>; 3]) -> Bucket {
     const WINDOW_TENTHS: i64 = 500;
     let (first, last) = (&products[0], &products[products.len() - 1]);
     let end = last.start.plus_tenths(WINDOW_TENTHS);
-    let accelerations: Vec<_> = products.iter().filter_map(|product| product.acceleration.as_ref()).collect();
-    let n = accelerations.len();
+    let calibrated = products.iter().filter(|product| product.acceleration.is_any()).count();
+    let of_axis = |axis: usize| products.iter().filter_map(move |product| product.acceleration.0[axis]);
+    let mean = |axis: usize, figure: fn(Component) -> f64| {
+        let n = of_axis(axis).count();
+        (n > 0).then(|| of_axis(axis).map(figure).sum::<f64>() / n as f64)
+    };
     let spread = |axis: usize| {
-        let values = || accelerations.iter().map(move |a| a.trimmed_ng.0[axis]);
-        (n > 0).then(|| Spread {
+        let values = || of_axis(axis).map(|of| of.trimmed_ng);
+        Some(Spread {
             min: rounded(values().fold(f64::INFINITY, f64::min)),
-            mean: rounded(values().sum::<f64>() / n as f64),
+            mean: rounded(mean(axis, |of| of.trimmed_ng)?),
             max: rounded(values().fold(f64::NEG_INFINITY, f64::max)),
         })
     };
-    let sigma = |axis: usize| {
-        let squares: f64 = accelerations.iter().map(|a| a.sigma_ng.0[axis].powi(2)).sum();
-        (n > 0).then(|| rounded((squares / n as f64).sqrt()))
-    };
-    let of_mean = |axis: usize| error.map(|BodyVector(ng)| rounded(ng[axis]));
-    let systematic = |axis: usize| {
-        let sum: f64 = accelerations.iter().map(|a| a.sigma_sys_ng.0[axis]).sum();
-        (n > 0).then(|| rounded(sum / n as f64))
-    };
+    let sigma = |axis: usize| mean(axis, |of| of.sigma_ng.powi(2)).map(f64::sqrt).map(rounded);
+    let of_mean = |axis: usize| error[axis].map(rounded);
+    let systematic = |axis: usize| mean(axis, |of| of.sigma_sys_ng).map(rounded);
     let worst = products.iter().map(|product| product.quality).max_by_key(|quality| (quality.reasons(), *quality));
     Bucket {
         span: wire::Span::new(&app.mission, first.start, end),
         count: products.len(),
-        calibrated: n,
+        calibrated,
         ax_ng: spread(0),
         ay_ng: spread(1),
         az_ng: spread(2),

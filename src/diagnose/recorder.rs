@@ -72,7 +72,7 @@ fn usable_windows(station: &Station) -> impl Iterator<Item = (&Window, &Product,
         let may = product.quality.is_good_but_for(FORGIVEN)
             && is_scaled(calibration, product.range)
             && product.mode == Mode::Normal
-            && product.acceleration.is_some();
+            && product.acceleration.whole().is_some();
         let deviation_ng = if may { deviation_ng(calibration, window, product) } else { None };
         Some((window, product, deviation_ng?))
     })
@@ -97,14 +97,14 @@ pub fn seen(station: &Station, span_s: [f64; 2]) -> Seen {
 pub fn taken(station: &Station, span_s: [f64; 2]) -> Taken {
     let mut taken = Taken { calibration: station.calibration().cloned(), ..Taken::default() };
     for (window, product, deviation_ng) in usable_windows(station) {
-        let Some(acceleration) = &product.acceleration else { continue };
+        let Some(acceleration) = product.acceleration.whole() else { continue };
         if !(span_s[0]..=span_s[1]).contains(&window.centre_s()) {
             continue;
         }
         let recording = &mut taken.recording;
         recording.clock_s.push(window.centre_s());
         for k in 0..3 {
-            recording.a_ng[k].push(acceleration.trimmed_ng.0[k]);
+            recording.a_ng[k].push(acceleration[k].trimmed_ng);
             recording.dev_ng[k].push(deviation_ng[k]);
         }
         taken.conditions.push((window.centre_s(), window.temperature_c, product.range));

@@ -11,7 +11,7 @@ use super::message::{Body, Message, Topic};
 use super::told::Told;
 use crate::pipeline::calibration::{Anomaly, Calibration};
 use crate::pipeline::files::version_json;
-use crate::pipeline::product::{BodyAcceleration, BodyVector, Product};
+use crate::pipeline::product::{BodyAcceleration, Component, Product};
 use crate::telemetry::{AccRecord, Event, Range};
 use crate::units::{Clock, MissionTime};
 
@@ -109,11 +109,12 @@ pub struct BodyAxes {
 
 impl BodyAxes {
     /// The wire form of a product's acceleration.
-    pub fn new(acceleration: Option<&BodyAcceleration>) -> Self {
-        let [ax_ng, ay_ng, az_ng] = components(acceleration.map(|a| a.trimmed_ng));
-        let [sigma_ax_ng, sigma_ay_ng, sigma_az_ng] = components(acceleration.map(|a| a.sigma_ng));
-        let [sigma_sys_ax_ng, sigma_sys_ay_ng, sigma_sys_az_ng] = components(acceleration.map(|a| a.sigma_sys_ng));
-        let [mean_ax_ng, mean_ay_ng, mean_az_ng] = components(acceleration.map(|a| a.mean_ng));
+    pub fn new(acceleration: &BodyAcceleration) -> Self {
+        let of = |figure: fn(&Component) -> f64| acceleration.each(|axis| decimals(figure(axis), 3));
+        let [ax_ng, ay_ng, az_ng] = of(|axis| axis.trimmed_ng);
+        let [sigma_ax_ng, sigma_ay_ng, sigma_az_ng] = of(|axis| axis.sigma_ng);
+        let [sigma_sys_ax_ng, sigma_sys_ay_ng, sigma_sys_az_ng] = of(|axis| axis.sigma_sys_ng);
+        let [mean_ax_ng, mean_ay_ng, mean_az_ng] = of(|axis| axis.mean_ng);
         Self {
             ax_ng,
             ay_ng,
@@ -171,7 +172,7 @@ pub struct Window {
     pub mode: &'static str,
     /// `good`, or the reasons for care with `+` between: partial (fewer samples used than the window holds), gap (telemetry missing in it),
     /// saturated (samples at the rail left out), range_mixed (those of the most frequent range used), range_corrected (the records named a
-    /// wrong one), table_moving (the table was away for a part of it, which was left out), uncalibrated (no value), noisy (far more scatter
+    /// wrong one), table_moving (the table was away for a part of it, which was left out), uncalibrated (an axis without a calibration has no value), noisy (far more scatter
     /// than its neighbours), extrapolated (beyond the calibrations that support the bias).
     pub quality: String,
     /// Version of the calibration it is made with; 0 is none.
@@ -180,11 +181,6 @@ pub struct Window {
     pub revision: String,
     /// Instrument clock since which it can be known: of its last record, or of its calibration where that is later.
     pub known_since_clock_s: f64,
-}
-
-/// The components of an acceleration, or three unknowns.
-fn components(vector: Option<BodyVector>) -> [Option<f64>; 3] {
-    vector.map_or([None; 3], |BodyVector(ng)| ng.map(|ng| Some(decimals(ng, 3))))
 }
 
 impl Window {
@@ -198,7 +194,7 @@ impl Window {
             window_start_clock_s: clock_s,
             met_s,
             utc,
-            acceleration: BodyAxes::new(product.acceleration.as_ref()),
+            acceleration: BodyAxes::new(&product.acceleration),
             q_x,
             q_y,
             q_z,

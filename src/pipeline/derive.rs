@@ -2,9 +2,9 @@
 
 use rapidhash::v3::rapidhash_v3;
 
-use super::axes::{OareVector, errors_to_body, to_body};
-use super::calibration::{Calibrated, Calibration, Measured, RangeCorrection};
-use super::product::{BodyAcceleration, Product, Revision};
+use super::axes::to_body;
+use super::calibration::{Calibration, Measured, RangeCorrection};
+use super::product::{Component, Product, Revision};
 use super::settings::WindowPolicy;
 use super::window::{AxisWindow, WINDOW_TENTHS, Window};
 use crate::math::robust::rounding_error_trimmed;
@@ -32,16 +32,11 @@ pub fn product(
             .zip(taken_in)
             .and_then(|(calibration, range)| calibration.apply(&measured(window, axis, range, axis_window, policy)));
     }
-    let acceleration = match calibrated {
-        [Some(x), Some(y), Some(z)] => Some(in_body_axes([x, y, z])),
-        _ => None,
-    };
+    let acceleration = to_body(calibrated);
     let estimates = window.axes.map(|axis| axis.map(|axis| axis.estimate));
     let extrapolated = calibrated.iter().flatten().any(|axis| axis.extrapolated);
-    let measurable = window.axes.iter().all(Option::is_some);
-    let quality = quality
-        .with_if(Quality::UNCALIBRATED, measurable && acceleration.is_none())
-        .with_if(Quality::EXTRAPOLATED, extrapolated && acceleration.is_some());
+    let uncalibrated = window.axes.iter().zip(&calibrated).any(|(axis, value)| axis.is_some() && value.is_none());
+    let quality = quality.with_if(Quality::UNCALIBRATED, uncalibrated).with_if(Quality::EXTRAPOLATED, extrapolated);
     let mut product = Product {
         start: window.start,
         acceleration,
@@ -97,16 +92,6 @@ fn measured(window: &Window, axis: Axis, range: Range, counts: &AxisWindow, poli
     }
 }
 
-fn in_body_axes(axes: [Calibrated; 3]) -> BodyAcceleration {
-    let of = |figure: fn(&Calibrated) -> f64| OareVector([0, 1, 2].map(|axis| figure(&axes[axis])));
-    BodyAcceleration {
-        trimmed_ng: to_body(of(|axis| axis.trimmed_ng)),
-        mean_ng: to_body(of(|axis| axis.mean_ng)),
-        sigma_ng: errors_to_body(of(|axis| axis.sigma_ng)),
-        sigma_sys_ng: errors_to_body(of(|axis| axis.sigma_sys_ng)),
-    }
-}
-
 /// Hash of the samples, of every figure they were turned into, and of when that can be known: of none of them is another told under the
 /// same name.
 fn revision(window: &Window, product: &Product) -> Revision {
@@ -114,9 +99,12 @@ fn revision(window: &Window, product: &Product) -> Revision {
     octets.extend(window.hash.to_le_bytes());
     octets.extend(product.calibration.to_le_bytes());
     octets.extend(product.known_since.tenths().to_le_bytes());
-    if let Some(acceleration) = &product.acceleration {
-        let vectors = [acceleration.trimmed_ng, acceleration.mean_ng, acceleration.sigma_ng, acceleration.sigma_sys_ng];
-        octets.extend(vectors.iter().flat_map(|vector| vector.0).flat_map(f64::to_le_bytes));
+    let acceleration = &product.acceleration;
+    let figures: [fn(&Component) -> f64; 4] = [|c| c.trimmed_ng, |c| c.mean_ng, |c| c.sigma_ng, |c| c.sigma_sys_ng];
+    octets
+        .extend(figures.into_iter().flat_map(|figure| acceleration.each(figure)).flatten().flat_map(f64::to_le_bytes));
+    if acceleration.is_any() && acceleration.whole().is_none() {
+        octets.extend(acceleration.0.map(|axis| u8::from(axis.is_some())));
     }
     octets.extend(product.range.map(|range| range.map_or(3, |range| range.index() as u8)));
     Revision(rapidhash_v3(&octets))

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::calibration::Anomaly;
 pub use super::calibration_file::{calibration_json, known_json, version_json};
 use super::ledger::{Account, PlaybackAccount, SecondSet};
-use super::product::{BodyVector, Product};
+use super::product::{Component, Product};
 use super::settings::Settings;
 use super::station::Station;
 use crate::telemetry::Range;
@@ -64,14 +64,9 @@ pub fn window_row(csv: &mut String, product: &Product, settings: &Settings) {
     let clock_s = product.start.seconds();
     let utc = settings.time.utc(clock_s);
     let _ = write!(csv, "{clock_s:.1},{:.1},{utc:.3}", settings.time.met_s(clock_s));
-    let acceleration = product.acceleration.as_ref();
-    let vectors = [
-        acceleration.map(|a| a.trimmed_ng),
-        acceleration.map(|a| a.sigma_ng),
-        acceleration.map(|a| a.sigma_sys_ng),
-        acceleration.map(|a| a.mean_ng),
-    ];
-    vectors.iter().for_each(|vector| vector_cells(csv, *vector));
+    let figures: [fn(&Component) -> f64; 4] = [|c| c.trimmed_ng, |c| c.sigma_ng, |c| c.sigma_sys_ng, |c| c.mean_ng];
+    let cells = figures.into_iter().flat_map(|figure| product.acceleration.each(figure));
+    cells.for_each(|ng| number_cell(csv, ng, 3));
     product.q.iter().for_each(|q| number_cell(csv, *q, 4));
     product.trim.iter().for_each(|trim| number_cell(csv, *trim, 4));
     product.range.iter().for_each(|range| word_cell(csv, range.map_or("", Range::letter)));
@@ -85,13 +80,6 @@ pub fn window_row(csv: &mut String, product: &Product, settings: &Settings) {
         product.revision,
         product.known_since.seconds()
     );
-}
-
-fn vector_cells(csv: &mut String, vector: Option<BodyVector>) {
-    match vector {
-        Some(BodyVector(components)) => components.iter().for_each(|ng| number_cell(csv, Some(*ng), 3)),
-        None => csv.push_str(",,,"),
-    }
 }
 
 /// A number with so many decimals; never a negative zero.

@@ -15,21 +15,40 @@ impl fmt::Display for Revision {
     }
 }
 
-/// Three components in Orbiter body axes (+X tail to nose, +Y to starboard, +Z down through the belly), in ng.
+/// The calibrated acceleration of one window on one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BodyVector(pub [f64; 3]);
+pub struct Component {
+    /// From the adaptive trimmed mean, ng.
+    pub trimmed_ng: f64,
+    /// From the plain mean, ng.
+    pub mean_ng: f64,
+    /// One statistical standard error of `trimmed_ng`: noise, bias and scale factor, ng.
+    pub sigma_ng: f64,
+    /// The systematic part, to be added in quadrature, ng.
+    pub sigma_sys_ng: f64,
+}
 
-/// The calibrated acceleration of one window, in body axes.
+/// The calibrated acceleration of one window on the Orbiter's body axes (+X tail to nose, +Y to starboard, +Z down through the belly). An
+/// axis has none where its samples are at the rail, of more ranges than one, or without a calibration; that takes nothing from the others.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BodyAcceleration {
-    /// From the adaptive trimmed mean.
-    pub trimmed_ng: BodyVector,
-    /// From the plain mean.
-    pub mean_ng: BodyVector,
-    /// One statistical standard error of `trimmed_ng`: noise, bias and scale factor.
-    pub sigma_ng: BodyVector,
-    /// The systematic part, to be added in quadrature.
-    pub sigma_sys_ng: BodyVector,
+pub struct BodyAcceleration(pub [Option<Component>; 3]);
+
+impl BodyAcceleration {
+    /// All three components, or none.
+    pub fn whole(&self) -> Option<[Component; 3]> {
+        let [x, y, z] = self.0;
+        Some([x?, y?, z?])
+    }
+
+    /// Whether an axis has a value.
+    pub fn is_any(&self) -> bool {
+        self.0.iter().any(Option::is_some)
+    }
+
+    /// A figure of each axis.
+    pub fn each(&self, figure: impl Fn(&Component) -> f64) -> [Option<f64>; 3] {
+        self.0.each_ref().map(|axis| axis.as_ref().map(&figure))
+    }
 }
 
 /// One row of `windows.csv`.
@@ -37,8 +56,8 @@ pub struct BodyAcceleration {
 pub struct Product {
     /// Start of the 50 s window.
     pub start: Clock,
-    /// None where there is no calibration, or no sample to calibrate.
-    pub acceleration: Option<BodyAcceleration>,
+    /// What it measured, axis by axis.
+    pub acceleration: BodyAcceleration,
     /// Q of the adaptive trimmed mean, per OARE axis; None when no sample was used or all were equal.
     pub q: [Option<f64>; 3],
     /// Trim fraction per end, per OARE axis.
@@ -59,4 +78,24 @@ pub struct Product {
     pub revision: Revision,
     /// Latest instrument clock among the frames used.
     pub known_since: Clock,
+}
+
+/// How much older the last window with all three axes may be than the last with any, and still be the latest value: channels are at the
+/// rail for seconds to minutes, and one that has no value for longer is itself the news.
+const WHOLE_WITHIN_TENTHS: i64 = 6_000;
+
+/// The latest value of products that come newest first: of the last window with all three axes, or of the last with any where none of ten
+/// minutes has all.
+pub fn latest<'a>(newest_first: impl Iterator<Item = &'a Product>) -> Option<&'a Product> {
+    let mut newest: Option<&Product> = None;
+    for product in newest_first.filter(|product| product.acceleration.is_any()) {
+        let first = *newest.get_or_insert(product);
+        if first.start.tenths() - product.start.tenths() > WHOLE_WITHIN_TENTHS {
+            break;
+        }
+        if product.acceleration.whole().is_some() {
+            return Some(product);
+        }
+    }
+    newest
 }

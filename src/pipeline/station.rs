@@ -9,7 +9,7 @@ use super::calibration::{self, Anomaly, Calibration, Derived, KnownCalibration, 
 use super::derive;
 use super::frames::{FrameDigest, FrameSet, Novelty};
 use super::ledger::{Ledger, PlaybackId};
-use super::product::{Product, Revision};
+use super::product::{Product, Revision, latest};
 use super::settings::Settings;
 use super::window::{Window, Windows, windows};
 use crate::ingest::wire::packet::apid;
@@ -443,9 +443,9 @@ impl Station {
         self.products.range(cells).map(|(_, product)| product.as_ref())
     }
 
-    /// The latest product with an acceleration.
+    /// The latest value.
     pub fn latest(&self) -> Option<&Product> {
-        self.products().rev().find(|product| product.acceleration.is_some())
+        latest(self.products().rev())
     }
 
     /// The uncalibrated windows, in order.

@@ -160,7 +160,7 @@ fn the_clean_sample_is_recovered_to_the_noise_floor() {
     let mut errors: [Vec<f64>; 3] = Default::default();
     for product in station.products().filter(|product| product.quality.is_good()) {
         let Ok(at) = truth.binary_search_by(|row| row.0.total_cmp(&product.start.seconds())) else { continue };
-        let found = product.acceleration.unwrap().trimmed_ng.0;
+        let found = product.acceleration.whole().unwrap().map(|axis| axis.trimmed_ng);
         (0..3).for_each(|axis| errors[axis].push(found[axis] - truth[at].1[axis]));
     }
     // The noise floor that the windows of this sample leave: RMS 118, 54, 70 ng in X, Y, Z body, to within 3 %.

@@ -216,9 +216,48 @@ fn samples_at_the_rail_enter_no_estimate() {
     let whole = |station: &Station| *station.products().find(|product| product.start.seconds() == 1000.0).unwrap();
     let (clean, railed) = (whole(&clean), whole(&railed));
     assert!(railed.quality.contains(Quality::SATURATED | Quality::PARTIAL));
-    let difference = railed.acceleration.unwrap().mean_ng.0[2] - clean.acceleration.unwrap().mean_ng.0[2];
+    let z_ng = |product: &oare_ground::pipeline::Product| product.acceleration.0[2].unwrap().mean_ng;
+    let difference = z_ng(&railed) - z_ng(&clean);
     // One of 500 samples at +-16 counts of 4.6 ng left out moves a mean by 0.15 ng at most; at the rail it would be 300 ng.
     assert!(difference.abs() < 0.15, "{difference}");
+}
+
+/// A channel that is at its rail takes no value from the others, and its own is unknown in every form.
+#[test]
+fn an_axis_at_its_rail_leaves_the_others_their_values() {
+    let clean: Vec<AccRecord> = (1000..2000).map(|second| record(second, 0)).collect();
+    let y_at_rail = |mut record: AccRecord| {
+        record.counts.iter_mut().for_each(|counts| counts[1] = AccRecord::RAIL_COUNTS);
+        AccRecord { at_rail: true, ..record }
+    };
+    // The last five minutes, and the last quarter of an hour.
+    let railed = |from_s: usize| -> Vec<AccRecord> {
+        clean.iter().enumerate().map(|(s, r)| if s < from_s { *r } else { y_at_rail(*r) }).collect()
+    };
+    let flown = |records: &[AccRecord]| {
+        replay(&Settings::sts65(), Some(&known()), |station| {
+            frames(records).iter().for_each(|frame| station.take(PlaybackId(1), frame));
+        })
+    };
+    let (whole, shortly, long) = (flown(&clean), flown(&railed(700)), flown(&railed(100)));
+    let at = |station: &Station, start_s: f64| *station.products().find(|p| p.start.seconds() == start_s).unwrap();
+    let (of_clean, of_railed) = (at(&whole, 1900.0), at(&shortly, 1900.0));
+    // Sensor Y is the body's Z.
+    let [x, y, _] = of_clean.acceleration.whole().unwrap();
+    assert_eq!(of_railed.acceleration.0, [Some(x), Some(y), None]);
+    assert_ne!(of_clean.revision, of_railed.revision);
+    assert!(of_railed.quality.contains(Quality::SATURATED) && !of_railed.quality.contains(Quality::UNCALIBRATED));
+    let csv = files::windows_csv(&shortly);
+    let row: Vec<&str> = csv.lines().last().unwrap().split(',').collect();
+    let empty =
+        csv.lines().next().unwrap().split(',').zip(row).filter(|(_, cell)| cell.is_empty()).map(|(name, _)| name);
+    assert_eq!(
+        empty.collect::<Vec<_>>(),
+        ["az_ng", "sigma_az_ng", "sigma_sys_az_ng", "mean_az_ng", "q_y", "trim_y", "range_y"]
+    );
+    // The latest value has all three axes, unless one has been away for long.
+    assert_eq!(shortly.latest().unwrap().start.seconds(), 1675.0);
+    assert_eq!(long.latest().unwrap().start, whole.latest().unwrap().start);
 }
 
 /// A value a hundred times too large is not told for an hour as if nothing were wrong with it.

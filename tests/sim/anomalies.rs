@@ -221,13 +221,13 @@ fn a_short_misreport_is_told_and_leaves_no_wrong_value() {
         let mut seen = 0;
         for product in flown.products().filter(|product| near.contains(&product.start.seconds())) {
             let (Some(found), Some(truth)) =
-                (&product.acceleration, flown.truth.get(&(product.start.seconds() as u32)))
+                (product.acceleration.whole(), flown.truth.get(&(product.start.seconds() as u32)))
             else {
                 continue;
             };
             for i in 0..3 {
-                let error = found.sigma_ng.0[i].hypot(found.sigma_sys_ng.0[i]);
-                let off = (found.trimmed_ng.0[i] - truth.body_ng[i]) / error;
+                let error = found[i].sigma_ng.hypot(found[i].sigma_sys_ng);
+                let off = (found[i].trimmed_ng - truth.body_ng[i]) / error;
                 assert!(off.abs() < 6.0, "{:?} axis {i}: {off} sigma, {}", product.start, product.quality);
                 seen += 1;
             }
@@ -260,10 +260,10 @@ fn a_range_that_one_axis_misreports_is_told_and_leaves_no_wrong_value() {
         let mut seen = 0;
         for product in flown.products().filter(|product| near.contains(&product.start.seconds())) {
             let truth = flown.truth.get(&(product.start.seconds() as u32));
-            let (Some(found), Some(truth)) = (&product.acceleration, truth) else { continue };
+            let (Some(found), Some(truth)) = (product.acceleration.whole(), truth) else { continue };
             for i in 0..3 {
-                let error = found.sigma_ng.0[i].hypot(found.sigma_sys_ng.0[i]);
-                let off = (found.trimmed_ng.0[i] - truth.body_ng[i]) / error;
+                let error = found[i].sigma_ng.hypot(found[i].sigma_sys_ng);
+                let off = (found[i].trimmed_ng - truth.body_ng[i]) / error;
                 assert!(off.abs() < 6.0, "{range:?} {axes:?} {:?} axis {i}: {off} sigma", product.start);
                 seen += 1;
             }

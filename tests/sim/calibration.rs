@@ -10,10 +10,10 @@ use oare_ground::pipeline::calibration::{AnomalyKind, Derived, KnownCalibration,
 use oare_ground::pipeline::station::replay;
 use oare_ground::pipeline::{PlaybackId, Product, Settings, Station};
 use oare_ground::simulate::{Fault, Mission, MissionConfig};
-use oare_ground::telemetry::{Axis, Quality, Range};
+use oare_ground::telemetry::{Axis, Mode, Quality, Range};
 use oare_ground::units::Clock;
 
-use super::flown::{derive_all, fly};
+use super::flown::{derive_all, fly, fly_altered};
 use super::shared_data;
 
 fn station_of(name: &str) -> Option<Station> {
@@ -74,8 +74,9 @@ fn the_misreported_interval_of_the_defects_sample_is_found() {
         let sigmas: Vec<f64> = corrected
             .iter()
             .filter_map(|product| {
-                let (found, (truth, normal)) = (product.acceleration?, truth.get(&(product.start.seconds() as i64))?);
-                normal.then(|| (found.trimmed_ng.0[axis] - truth[axis]) / found.sigma_ng.0[axis])
+                let (found, (truth, normal)) =
+                    (product.acceleration.0[axis]?, truth.get(&(product.start.seconds() as i64))?);
+                normal.then(|| (found.trimmed_ng - truth[axis]) / found.sigma_ng)
             })
             .collect();
         let inside = sigmas.iter().filter(|z| z.abs() < 2.0).count() as f64 / sigmas.len() as f64;
@@ -86,6 +87,32 @@ fn the_misreported_interval_of_the_defects_sample_is_found() {
     assert!((shift.value - 150.0).abs() < 3.0 * shift.sigma, "{}", shift.sentence);
     let aborted = derived.anomalies.iter().filter(|a| a.kind == AnomalyKind::ScaleRecordDefect).count();
     assert_eq!(aborted, 1);
+}
+
+/// Where the calibrations of X never came down, Y and Z have their values all the same.
+#[test]
+fn an_axis_without_a_bias_leaves_the_others_their_values() {
+    let flown = fly_altered(MissionConfig::sts65(5, 12.0), |record| {
+        (record.mode != Mode::Bias || record.target != 1).then_some(record)
+    });
+    let mut sigmas: [Vec<f64>; 2] = Default::default();
+    let mut products = 0;
+    for product in flown.products().filter(|product| product.mode == Mode::Normal) {
+        let [x, y, z] = product.acceleration.0;
+        assert!(x.is_none(), "{:?}", product.start);
+        products += 1;
+        let truth = flown.truth.get(&(product.start.seconds() as u32)).filter(|truth| truth.normal);
+        let (Some(y), Some(z), Some(truth)) = (y, z, truth) else { continue };
+        assert!(product.quality.contains(Quality::UNCALIBRATED));
+        sigmas[0].push((y.trimmed_ng - truth.body_ng[1]) / y.sigma_ng.hypot(y.sigma_sys_ng));
+        sigmas[1].push((z.trimmed_ng - truth.body_ng[2]) / z.sigma_ng.hypot(z.sigma_sys_ng));
+    }
+    assert!(products > 1500, "{products}");
+    for (axis, of_axis) in ["Y", "Z"].into_iter().zip(sigmas) {
+        let inside = of_axis.iter().filter(|z| z.abs() < 2.0).count() as f64 / of_axis.len() as f64;
+        println!("{axis}: {:.1} % of {} windows inside two standard errors", 100.0 * inside, of_axis.len());
+        assert!(of_axis.len() > 1200 && inside > 0.9, "{axis}: {inside:.3} of {}", of_axis.len());
+    }
 }
 
 /// Beside the pooled missions of `coverage`, the two samples: single ones, so that their errors are all of one piece.
@@ -106,8 +133,8 @@ fn the_error_bars_of_the_samples_hold() {
                 Some((counts - known.bias_at(axis, Range::C, clock_s, t)?) / sigma)
             });
             let acceleration = station.products().filter(|p| !p.quality.contains(Quality::PARTIAL)).filter_map(|p| {
-                let (found, (truth, normal)) = (p.acceleration?, truth.get(&(p.start.seconds() as i64))?);
-                normal.then(|| (found.trimmed_ng.0[i] - truth[i]) / found.sigma_ng.0[i])
+                let (found, (truth, normal)) = (p.acceleration.0[i]?, truth.get(&(p.start.seconds() as i64))?);
+                normal.then(|| (found.trimmed_ng - truth[i]) / found.sigma_ng)
             });
             let scale = Range::ALL.into_iter().map(|range| {
                 let found = current.scale[i][range.index()];

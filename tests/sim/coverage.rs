@@ -57,8 +57,8 @@ fn tally(flown: &Flown) -> Tally {
         tally.bias_sigma_ng[i] = errors.iter().map(|[_, sigma]| sigma).sum::<f64>() / count;
         tally.acceleration[i] = share(flown.products().filter_map(|product| {
             let truth = flown.truth.get(&(product.start.seconds() as u32)).filter(|truth| truth.normal)?;
-            let found = product.acceleration.filter(|_| !product.quality.contains(Quality::PARTIAL))?;
-            Some((found.trimmed_ng.0[i] - truth.body_ng[i]).abs() < 2.0 * found.sigma_ng.0[i])
+            let found = product.acceleration.0[i].filter(|_| !product.quality.contains(Quality::PARTIAL))?;
+            Some((found.trimmed_ng - truth.body_ng[i]).abs() < 2.0 * found.sigma_ng)
         }));
     }
     tally.scale = Axis::ALL.map(|axis| {
@@ -74,7 +74,7 @@ fn tally(flown: &Flown) -> Tally {
 /// Of one mission, the share of hourly means inside two of their standard errors, body axes.
 fn hours_inside(flown: &Flown) -> [f64; 3] {
     let error = MeanError::new(flown.derived.current().expect("a calibration"));
-    let whole = |product: &Product| product.acceleration.is_some() && product.quality.is_good();
+    let whole = |product: &Product| product.acceleration.whole().is_some() && product.quality.is_good();
     let products: Vec<Product> = flown.products().filter(whole).collect();
     let hour = |product: &Product| product.start.tenths().div_euclid(36_000);
     [0, 1, 2].map(|i| {
@@ -83,9 +83,9 @@ fn hours_inside(flown: &Flown) -> [f64; 3] {
                 flown.truth.get(&(product.start.seconds() as u32)).filter(|truth| truth.normal).map(|t| t.body_ng[i])
             };
             let truths = products.iter().map(truth).collect::<Option<Vec<f64>>>()?;
-            let found = products.iter().filter_map(|product| product.acceleration);
-            let missed = found.zip(truths).map(|(found, truth)| found.trimmed_ng.0[i] - truth).sum::<f64>();
-            Some((missed / products.len() as f64).abs() < 2.0 * error.of(products)?.0[i])
+            let found = products.iter().filter_map(|product| product.acceleration.0[i]);
+            let missed = found.zip(truths).map(|(found, truth)| found.trimmed_ng - truth).sum::<f64>();
+            Some((missed / products.len() as f64).abs() < 2.0 * error.of(products)[i]?)
         }))
     })
 }

@@ -1,7 +1,7 @@
 // The dashboard: history first, then live over the WebSocket. Everything shown comes from the service's own interface.
 "use strict";
 
-const WINDOW_S = 50, STEP_S = 25, POINTS_MAX = 60000, REFRESH_MS = 3000;
+const WINDOW_S = 50, STEP_S = 25, WHOLE_WITHIN_S = 600, POINTS_MAX = 60000, REFRESH_MS = 3000;
 const token = new URLSearchParams(location.search).get("access_token");
 const withToken = (path) => token ? path + (path.includes("?") ? "&" : "?") + "access_token=" + encodeURIComponent(token) : path;
 const get = async (path) => {
@@ -16,7 +16,7 @@ const clockText = (s) => { const d = Math.floor(s / 86400), t = new Date((s - d 
 
 let liftoffClockS = 0;         // met_s = clock_s - this
 const windows = new Map();     // window_start_clock_s -> window
-let gaps = [], playbacks = [], latest = null, dirty = true;
+let gaps = [], playbacks = [], newest = null, whole = null, dirty = true;
 
 // ---- traces -----------------------------------------------------------------------------------------------------
 const AXES = [["x", "X tail to nose"], ["y", "Y to starboard"], ["z", "Z down"]];
@@ -75,6 +75,7 @@ function draw() {
 
 // ---- the latest value ---------------------------------------------------------------------------------------------
 function drawNow() {
+  const latest = latestWindow();
   if (!latest) return;
   for (const axis of ["x", "y", "z"]) {
     const cell = byId("a" + axis), value = latest[`a${axis}_ng`];
@@ -82,16 +83,25 @@ function drawNow() {
     cell.dataset.ng = value;
     byId("s" + axis).textContent = ng(latest[`sigma_a${axis}_ng`]);
   }
-  const start = latest.window_start_clock_s ?? latest.clock_s;
+  const start = latest.window_start_clock_s;
   byId("now").dataset.revision = latest.revision;
   byId("when").textContent = `MET ${clockText(latest.met_s)} · ${latest.utc.replace("T", " ").slice(0, 19)} UTC`;
   byId("quality").textContent = `clock ${start} s · quality ${latest.quality} · calibration ${latest.calibration} · revision ${latest.revision}`;
 }
 
+const valued = (window, quantity) => ["ax_ng", "ay_ng", "az_ng"][quantity]((name) => window[name] !== null);
+const later = (a, b) => !a || b.window_start_clock_s >= a.window_start_clock_s ? b : a;
+
+// As `/accel`: of the last window with all three axes, or, where it is ten minutes older than the last with any, of that.
+function latestWindow() {
+  const isNear = whole && newest.window_start_clock_s - whole.window_start_clock_s <= WHOLE_WITHIN_S;
+  return isNear ? whole : newest;
+}
+
 function take(window) {
   windows.set(window.window_start_clock_s, window);
-  const start = latest ? latest.window_start_clock_s ?? latest.clock_s : -Infinity;
-  if (window.ax_ng !== null && window.window_start_clock_s >= start) latest = window;
+  if (valued(window, "some")) newest = later(newest, window);
+  if (valued(window, "every")) whole = later(whole, window);
   if (windows.size > POINTS_MAX) windows.delete(windows.keys().next().value);
   liftoffClockS = window.window_start_clock_s - window.met_s;
   dirty = true;
@@ -101,10 +111,9 @@ function take(window) {
 function drop(gone) {
   const startS = gone.window_start_clock_s;
   windows.delete(startS);
-  if (latest && (latest.window_start_clock_s ?? latest.clock_s) === startS) {
-    const known = [...windows.values()].filter((window) => window.ax_ng !== null);
-    latest = known.reduce((a, b) => !a || b.window_start_clock_s > a.window_start_clock_s ? b : a, null);
-  }
+  const last = (quantity) => [...windows.values()].filter((window) => valued(window, quantity)).reduce(later, null);
+  if (newest?.window_start_clock_s === startS) newest = last("some");
+  if (whole?.window_start_clock_s === startS) whole = last("every");
   dirty = true;
 }
 

@@ -3,8 +3,8 @@
 
 use super::apply::{Bias, Calibration};
 use super::bias_law::PARAMETERS;
-use crate::pipeline::axes::{OareVector, errors_to_body};
-use crate::pipeline::product::{BodyVector, Product};
+use crate::pipeline::axes::errors_to_body;
+use crate::pipeline::product::Product;
 use crate::pipeline::window::WINDOW_TENTHS;
 use crate::telemetry::{Axis, Range};
 
@@ -35,11 +35,9 @@ impl<'a> MeanError<'a> {
         Self { calibration, open }
     }
 
-    /// The statistical standard error, body axes, ng, of the mean of the products with an acceleration, which are in order of time and made
-    /// with this calibration; None without one. Systematic errors are not in it.
-    pub fn of(&self, products: &[Product]) -> Option<BodyVector> {
-        let values = || products.iter().filter_map(|product| Some((product, product.acceleration?)));
-        let count = values().count();
+    /// The statistical standard error, body axes, ng, of the mean of the products with a value on an axis, which are in order of time and
+    /// made with this calibration; None without one. Systematic errors are not in it.
+    pub fn of(&self, products: &[Product]) -> [Option<f64>; 3] {
         let of_axis = |axis: Axis| {
             let i = axis.index();
             // Body Y is the sensor's Z, and body Z its Y.
@@ -47,11 +45,13 @@ impl<'a> MeanError<'a> {
             let mut shared = [[0.0; SHARED]; 3];
             let mut variance = 0.0;
             let mut before: Option<(i64, f64)> = None;
-            for (product, acceleration) in values() {
+            let mut count = 0;
+            for product in products {
+                let Some(value) = product.acceleration.0[body] else { continue };
                 let range = product.range[i].unwrap_or(Range::C);
-                let of_window = self.shared(axis, range, product, acceleration.trimmed_ng.0[body]);
+                let of_window = self.shared(axis, range, product, value.trimmed_ng);
                 shared[range.index()].iter_mut().zip(of_window).for_each(|(sum, one)| *sum += one);
-                let all = acceleration.sigma_ng.0[body].powi(2);
+                let all = value.sigma_ng.powi(2);
                 let noise = (all - of_window.iter().map(|x| x * x).sum::<f64>()).max(0.0).sqrt();
                 let start = product.start.tenths();
                 // Of two that overlap by half, half of the noise is the same.
@@ -59,11 +59,12 @@ impl<'a> MeanError<'a> {
                     .map_or(0.0, |(last, noise)| noise * (1.0 - (start - last) as f64 / WINDOW_TENTHS as f64).max(0.0));
                 variance += noise * noise + 2.0 * noise * overlap;
                 before = Some((start, noise));
+                count += 1;
             }
             variance += shared.as_flattened().iter().map(|sum| sum * sum).sum::<f64>();
-            variance.sqrt() / count as f64
+            (count > 0).then(|| variance.sqrt() / f64::from(count))
         };
-        (count > 0).then(|| errors_to_body(OareVector(Axis::ALL.map(of_axis))))
+        errors_to_body(Axis::ALL.map(of_axis))
     }
 
     /// What a value has in common with others of its axis and range.

@@ -61,7 +61,7 @@ pub fn page(station: &Station, plates: &Plates, Figures { shown: figures, missin
 
 fn under(station: &Station, plates: &Plates) -> String {
     let windows = station.products().count();
-    let calibrated = station.products().filter(|product| product.acceleration.is_some()).count();
+    let calibrated = station.products().filter(|product| product.acceleration.whole().is_some()).count();
     let [from, to] = plates.span_h;
     let gaps = station.gaps();
     let missing_s: f64 = gaps.iter().fold(0.0, |sum, (from, to)| sum + to.seconds() - from.seconds());

@@ -1,7 +1,7 @@
 //! What the figures show: measured, fitted and left, the scale factors, and the histories in spans of two days.
 
 use crate::pipeline::calibration::BiasMeasurement;
-use crate::pipeline::product::Product;
+use crate::pipeline::product::{Component, Product};
 use crate::pipeline::station::Station;
 use crate::telemetry::{Axis, Range};
 
@@ -103,7 +103,7 @@ impl Plates {
                 .map(|product| (met_h(product), *product))
                 .filter(|(h, _)| (from_h..=from_h + HISTORY_H).contains(h))
                 .collect();
-            if inside.iter().any(|(_, product)| product.acceleration.is_some()) {
+            if inside.iter().any(|(_, product)| product.acceleration.is_any()) {
                 plates.histories.push(history([from_h, (from_h + HISTORY_H).min(span_h[1])], &inside));
             }
         }
@@ -152,8 +152,9 @@ fn history(span_h: [f64; 2], inside: &[(f64, &Product)]) -> History {
         let mut last_bucket = i64::MIN;
         let mut count = 0.0;
         for (h, product) in inside {
-            let Some(acceleration) = &product.acceleration else { continue };
-            let (ng, sigma) = (acceleration.trimmed_ng.0[axis], acceleration.sigma_ng.0[axis]);
+            let Some(Component { trimmed_ng: ng, sigma_ng: sigma, .. }) = product.acceleration.0[axis] else {
+                continue;
+            };
             all.push(ng);
             let bucket = ((h - span_h[0]) / bucket_h).floor() as i64;
             if bucket == last_bucket
