@@ -3,8 +3,9 @@
 //! While searching, a marker with at most one wrong bit at any bit offset, in any of the four senses, is a candidate; it is
 //! believed when its frame checks. Once locked, the next frame is expected in its place: a marker with at most three
 //! wrong bits is accepted there, and two frames without one are passed over (their frames are still tried) before the
-//! search starts again behind the last good frame, so that nothing is skipped. Every decision waits for the bits it
-//! needs: how the stream is cut into chunks changes nothing.
+//! search starts again behind the last good frame, so that nothing is skipped. Where a good frame ends the passing over,
+//! what lies between is searched as well: two slips may have cancelled. Every decision waits for the bits it needs: how
+//! the stream is cut into chunks changes nothing.
 
 use super::coding::{ChannelDecoder, LinkConfig, SYNC_MARKER};
 use super::frame::{FrameId, FrameRefusal, TransferFrame};
@@ -17,6 +18,9 @@ const LOCKED_WRONG_BITS_MAX: u32 = 3;
 const FLYWHEEL_FRAMES_MAX: u32 = 2;
 /// Frames that do not check, in their expected places, before searching again: bounds what must be kept.
 const UNCHECKED_FRAMES_MAX: u32 = 256;
+/// Refused frames that may lie over one another, of those that a search finds: a stretch that is full of markers would otherwise become
+/// many times its size.
+const OVERLAPPING_MAX: usize = 8;
 /// Bits of the marker.
 const MARKER_BITS: u64 = 32;
 
@@ -113,10 +117,19 @@ struct Lock {
     sense: Sense,
     /// Where the next marker-and-frame begins.
     next_bit: u64,
-    /// Frames without a marker so far.
+    /// Frames in a row without a marker.
     passed_over: u32,
+    /// Whether one was passed over since the last good one.
+    skipped: bool,
     /// Frames that did not check since the last good one.
     unchecked: u32,
+}
+
+impl Lock {
+    /// Behind a good frame.
+    const fn new(sense: Sense, next_bit: u64) -> Self {
+        Self { sense, next_bit, passed_over: 0, skipped: false, unchecked: 0 }
+    }
 }
 
 /// Finds frames in one stream of bits.
@@ -198,7 +211,9 @@ impl Deframer {
         let end_bit = lock.next_bit + unit_bits;
         lock.next_bit = end_bit;
         if accepted(&arrival) {
-            lock.passed_over = 0;
+            if lock.skipped {
+                self.search_between(end_bit - unit_bits, hand_on);
+            }
             self.believe(lock, arrival, end_bit, hand_on);
             return true;
         }
@@ -207,6 +222,7 @@ impl Deframer {
             self.doubtful.push(arrival);
         } else {
             lock.passed_over += 1;
+            lock.skipped = true;
         }
         lock.unchecked += 1;
         self.lock = Some(lock);
@@ -214,6 +230,33 @@ impl Deframer {
             self.search_again();
         }
         true
+    }
+
+    /// Hands on the good frames out of their expected places from the last good one on, up to where the next begins.
+    fn search_between(&mut self, end_bit: u64, hand_on: &mut impl FnMut(Arrival)) {
+        self.search_bit = self.floor_bit;
+        while let Some((bit, sense)) = self.next_marker().filter(|(bit, _)| *bit < end_bit) {
+            self.search_bit = bit + 1;
+            let Some(frame_bit) = self.frame_at(bit, sense) else { continue };
+            let behind_bit = end_of(bit, frame_bit, self.coded_bits());
+            if behind_bit > end_bit {
+                continue;
+            }
+            let arrival = self.read_frame(sense, frame_bit);
+            if accepted(&arrival) {
+                self.believe(Lock::new(sense, behind_bit), arrival, behind_bit, hand_on);
+            }
+        }
+    }
+
+    /// First bit of the frame that a marker belongs to; None where that lies before what is to be read.
+    fn frame_at(&self, marker_bit: u64, sense: Sense) -> Option<u64> {
+        match sense.direction {
+            Direction::Forward => Some(marker_bit + MARKER_BITS),
+            Direction::Reverse => {
+                marker_bit.checked_sub(self.coded_bits()).filter(|frame_bit| *frame_bit >= self.floor_bit)
+            }
+        }
     }
 
     /// Gives up the lock and searches from the last good frame on.
@@ -228,33 +271,38 @@ impl Deframer {
         self.settle_doubtful(hand_on);
         let Some((bit, sense)) = found else { return false };
         let coded_bits = self.coded_bits();
-        let frame_bit = match sense.direction {
-            Direction::Forward => bit + MARKER_BITS,
-            Direction::Reverse if bit >= self.floor_bit + coded_bits => bit - coded_bits,
-            Direction::Reverse => {
-                self.doubtful.push(self.truncated(sense, self.floor_bit, bit));
-                self.search_bit = bit + 1;
-                return true;
-            }
+        let Some(frame_bit) = self.frame_at(bit, sense) else {
+            self.doubt(self.truncated(sense, self.floor_bit, bit));
+            self.search_bit = bit + 1;
+            return true;
         };
         if frame_bit + coded_bits > self.received_bits() {
             self.search_bit = bit;
             if !ended {
                 return false;
             }
-            self.doubtful.push(self.truncated(sense, frame_bit, self.received_bits()));
+            self.doubt(self.truncated(sense, frame_bit, self.received_bits()));
             self.search_bit = bit + 1;
             return true;
         }
         let arrival = self.read_frame(sense, frame_bit);
         self.search_bit = bit + 1;
         if accepted(&arrival) {
-            let end_bit = bit.max(frame_bit) + if frame_bit > bit { coded_bits } else { MARKER_BITS };
-            self.believe(Lock { sense, next_bit: end_bit, passed_over: 0, unchecked: 0 }, arrival, end_bit, hand_on);
+            let end_bit = end_of(bit, frame_bit, coded_bits);
+            self.believe(Lock::new(sense, end_bit), arrival, end_bit, hand_on);
         } else {
-            self.doubtful.push(arrival);
+            self.doubt(arrival);
         }
         true
+    }
+
+    /// Keeps a refused frame of a search, unless many lie over it already: their octets are those of the others.
+    fn doubt(&mut self, refused: Arrival) {
+        let end_of = |arrival: &Arrival| arrival.first_bit + arrival.octets.len() as u64 * 8;
+        let lies_over = |other: &&Arrival| other.first_bit < end_of(&refused) && refused.first_bit < end_of(other);
+        if self.doubtful.iter().filter(lies_over).count() < OVERLAPPING_MAX {
+            self.doubtful.push(refused);
+        }
     }
 
     /// Hands on refused frames that no frame found from here on can reach back to.
@@ -265,19 +313,18 @@ impl Deframer {
         self.doubtful.drain(..settled).for_each(hand_on);
     }
 
-    /// A frame checks: what was doubtful before it is settled, and the next one is expected behind it.
+    /// A frame checks: what was doubtful before it is settled, what lies over it was none, and the next one is expected behind it.
     fn believe(&mut self, lock: Lock, good: Arrival, end_bit: u64, hand_on: &mut impl FnMut(Arrival)) {
         let start_bit = end_bit - MARKER_BITS - self.coded_bits();
-        for doubtful in self.doubtful.drain(..) {
-            // A marker inside a frame that checks was none.
-            if doubtful.first_bit <= start_bit {
-                hand_on(doubtful);
-            }
-        }
+        let (before, behind): (Vec<_>, Vec<_>) =
+            self.doubtful.drain(..).partition(|doubtful| doubtful.first_bit < end_bit);
+        self.doubtful = behind;
+        // A marker inside a frame that checks was none.
+        before.into_iter().filter(|doubtful| doubtful.first_bit <= start_bit).for_each(&mut *hand_on);
         hand_on(good);
         self.floor_bit = end_bit;
         self.search_bit = end_bit;
-        self.lock = Some(Lock { unchecked: 0, ..lock });
+        self.lock = Some(Lock::new(lock.sense, lock.next_bit));
     }
 
     fn read_frame(&mut self, sense: Sense, frame_bit: u64) -> Arrival {
@@ -386,6 +433,11 @@ impl Deframer {
             self.dropped_octets += done;
         }
     }
+}
+
+/// Where a marker and its frame end, whichever comes first.
+const fn end_of(marker_bit: u64, frame_bit: u64, coded_bits: u64) -> u64 {
+    if frame_bit > marker_bit { frame_bit + coded_bits } else { marker_bit + MARKER_BITS }
 }
 
 /// Whether a frame's error control vouches for its place, whoever it belongs to.

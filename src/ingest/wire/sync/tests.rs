@@ -91,6 +91,44 @@ fn a_bit_slip_costs_only_the_frame_it_is_in() {
 }
 
 #[test]
+fn slips_that_cancel_cost_only_the_frames_they_are_in() {
+    let frames = frames(9);
+    let unit = 32 + 64 * 8;
+    for sense in Sense::ALL {
+        for (first, second) in [(3, 5), (3, 6), (2, 6)] {
+            let mut bits = playback(&frames, sense, 5);
+            bits.insert(5 + first * unit + 200, true);
+            bits.remove(5 + second * unit + 300);
+            let found = arrivals(&to_octets(&bits), 33);
+            let mut counts = good_counts(&found);
+            if sense.direction == Direction::Reverse {
+                counts.iter_mut().for_each(|count| *count = 8 - *count);
+            }
+            let expected: Vec<u32> = (0..9).filter(|n| ![first, second].contains(&(*n as usize))).collect();
+            assert_eq!(counts, expected, "{sense:?}, slips in {first} and {second}");
+            assert!(found.is_sorted_by_key(|arrival| arrival.first_bit));
+        }
+    }
+}
+
+#[test]
+fn a_stretch_full_of_markers_does_not_become_many_times_its_size() {
+    let markers = SYNC_MARKER.to_be_bytes().repeat(20_000);
+    let octets = [to_octets(&playback(&frames(2), Sense::ALL[0], 0)), markers, vec![0x33; 200]].concat();
+    let found = arrivals(&octets, 1000);
+    assert_eq!(good_counts(&found), [0, 1]);
+    let kept: usize = found.iter().map(|arrival| arrival.octets.len()).sum();
+    assert!(kept < (OVERLAPPING_MAX + 1) * octets.len(), "{kept}");
+    // Every octet of it is in one of them.
+    let mut covered_to = 0;
+    for arrival in &found {
+        assert!(arrival.first_bit <= covered_to + 32, "{} to {}", covered_to, arrival.first_bit);
+        covered_to = covered_to.max(arrival.first_bit + 8 * arrival.octets.len() as u64);
+    }
+    assert!(covered_to / 8 + 64 > 80_000);
+}
+
+#[test]
 fn a_frame_that_is_cut_off_is_refused_as_truncated() {
     let octets = to_octets(&playback(&frames(2), Sense::ALL[0], 0));
     let found = arrivals(&octets[..octets.len() - 30], 10);
