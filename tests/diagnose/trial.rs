@@ -4,6 +4,8 @@ use super::case;
 use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::case::Case;
+use oare_ground::diagnose::catalogue::{Shape, gravity_gradient};
+use oare_ground::diagnose::scene::Scene;
 use oare_ground::diagnose::{Analysis, Settings, analyse};
 
 fn files(kind: Kind, seed: u64, only: &'static str) -> Vec<(String, Vec<u8>)> {
@@ -71,4 +73,31 @@ fn the_bootstrap_says_the_same_every_time_and_forbids_nothing_that_is_loud() {
     let clean = case(&files(Kind::Clean, 31, "cg_offset"));
     let quiet = analysed(&clean, 40).diagnosis;
     assert!(quiet.verdict == Verdict::Consistent && quiet.false_alarm_probability > 0.01, "{quiet:?}");
+}
+
+/// A simulation that counts the gravity gradient twice leaves it out minus once: no omission, and the formula says what it is.
+#[test]
+fn what_a_simulation_has_twice_is_no_omission_and_its_formula_is_what_was_fitted() {
+    for seed in [41, 42] {
+        let mut case = case(&files(Kind::Clean, seed, "gravity_gradient"));
+        let once = {
+            let scene = Scene::new(&case).unwrap();
+            assert_eq!(scene.schedule.len(), case.recording.clock_s.len());
+            match (gravity_gradient::EFFECT.signature)(&scene, &[0.0; 2]) {
+                Some(Shape::Columns(columns)) => columns[0].clone(),
+                _ => panic!("no columns"),
+            }
+        };
+        for (recorded, once) in case.recording.a_ng.iter_mut().zip(&once) {
+            recorded.iter_mut().zip(once.as_ref().unwrap()).for_each(|(ng, once)| *ng -= once);
+        }
+        let found = analysed(&case, 0).diagnosis;
+        assert_eq!((found.verdict, found.effects.len()), (Verdict::Unexplained, 0), "{found:?}");
+        let hypothesis = found.hypothesis.expect("a formula");
+        let fraction = hypothesis.formula.strip_prefix("gravity_gradient with fraction = ").expect("its own formula");
+        let fraction: f64 = fraction.split('(').next().unwrap().parse().unwrap();
+        assert!((fraction + 1.0).abs() < 0.05, "{hypothesis:?}");
+        assert!(found.notes.iter().any(|note| note.starts_with("gravity_gradient is refused")), "{:?}", found.notes);
+        assert!(found.fit.unwrap().held_out.excess_removed > 0.9);
+    }
 }

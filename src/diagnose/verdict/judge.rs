@@ -30,7 +30,7 @@ pub struct Judged<'a> {
     pub on_trial: Option<(&'a Weighed, Tried)>,
     /// A finding that failed its trial.
     pub failure: Option<Failure>,
-    /// An open form is better than every set of listed effects.
+    /// An open form is better than every set of listed effects, those that cannot be believed included where they lead.
     pub open_wins: bool,
 }
 
@@ -47,7 +47,8 @@ pub fn judge<'a>(
     let [top, best, open] =
         [listed.first().copied(), solution.listed.first(), solution.open.first()].map(|w| (height(w), w));
     let refused = best.0 - top.0 > REFUSED_MARGIN;
-    let open_wins = open.0 > top.0.max(null);
+    let to_beat = if refused { best.0 } else { top.0 };
+    let open_wins = open.0 > to_beat.max(null);
     let claimed = probability <= asked(claim) && best.0.max(open.0) > null;
     let (verdict, chosen) = match (claimed, open_wins, refused) {
         (false, _, _) => (Verdict::Consistent, None),

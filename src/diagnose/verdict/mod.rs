@@ -31,7 +31,7 @@ use self::named::name;
 use self::nearest::nearest;
 use self::proportion::{of_proportion, of_the_simulation};
 use self::stands::tried;
-use self::unnamed::{hypothesis, near_fail, of_failure, of_remains};
+use self::unnamed::{hypothesis, of_failure, of_remains};
 use super::answer::{Diagnosis, LEAST_PROBABILITY, Located, Source, Verdict};
 use super::axes;
 use super::catalogue::Effect;
@@ -255,10 +255,11 @@ impl Findings<'_> {
                     answer.hypothesis = Some(of_remains(&r, &format!(" {} {best_ids}.", place.said())));
                 }
                 _ if failed => {}
-                _ if self.open_wins => answer.hypothesis = Some(hypothesis(library, &best, &self.listed)),
                 _ => {
-                    let near = near_fail(library, &best, &self.listed);
-                    answer.notes.push(format!("No set of listed effects can be believed. {near}").trim_end().into());
+                    answer.hypothesis = Some(hypothesis(library, &best, &self.listed));
+                    if !self.open_wins {
+                        answer.notes.push("No set of listed effects can be believed.".into());
+                    }
                 }
             }
         } else {

@@ -3,6 +3,7 @@
 use super::judge::Failure;
 use super::{Best, ids};
 use crate::diagnose::answer::Hypothesis;
+use crate::diagnose::model::Fitted;
 use crate::diagnose::remains::Remains;
 use crate::diagnose::search::{Family, Weighed};
 use crate::diagnose::solve::Library;
@@ -27,7 +28,7 @@ pub fn of_failure(Failure { set, why }: &Failure) -> String {
 }
 
 /// By how much the listed sets that came near are less likely than the best of all.
-pub fn near_fail(library: &Library, best: &Best, listed: &[&Weighed]) -> String {
+fn near_fail(library: &Library, best: &Best, listed: &[&Weighed]) -> String {
     let near = |w: &&Weighed| {
         format!(
             "{} lacks {:.1} in log evidence",
@@ -38,14 +39,26 @@ pub fn near_fail(library: &Library, best: &Best, listed: &[&Weighed]) -> String 
     listed.iter().take(3).map(near).collect::<Vec<_>>().join("; ")
 }
 
-/// From the open forms that won, with the listed sets that came near.
+/// From the open forms that won, or from the listed set that leads and cannot be believed, with the listed sets that came near. What of the
+/// catalogue is in it stands with its parameters: the formula gives what was fitted.
 pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed]) -> Hypothesis {
     let fails = near_fail(library, best, listed);
     let mut formula = Vec::new();
     let mut axis = Vec::new();
     let mut location = Vec::new();
     for (i, m) in best.set.members.iter().enumerate() {
-        let Family::Open(form) = library.entries[m.entry].family else { continue };
+        let axes = m.axis.map_or("x, y, z", |a| ["x", "y", "z"][a]);
+        let form = match library.entries[m.entry].family {
+            Family::Open(form) => form,
+            Family::Listed(effect) => {
+                let of = |p: &Fitted| format!("{} = {}", p.name, with_error(p.value, p.sigma));
+                let parameters: Vec<String> = best.fits[i].parameters.iter().map(of).collect();
+                formula.push(format!("{} with {}", effect.id, parameters.join(", ")));
+                axis.push(axes);
+                location.push(effect.covariate.replace('_', " "));
+                continue;
+            }
+        };
         let amplitudes: Vec<String> = best.fits[i].parameters.iter().map(|p| with_error(p.value, p.sigma)).collect();
         let (said, member) = (&library.forms[form], m.theta[0] as usize);
         let deviations: Vec<String> = said.deviations[member].iter().map(|d| format!("{d:.4e}")).collect();
@@ -55,8 +68,8 @@ pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed]) -> Hypoth
             said.formulas[member],
             deviations.join(", ")
         ));
-        axis.push(m.axis.map_or("x, y, z", |a| ["x", "y", "z"][a]));
-        location.push(library.forms[form].location);
+        axis.push(axes);
+        location.push(library.forms[form].location.to_string());
     }
     let failing = if fails.is_empty() { String::new() } else { format!(" Near catalogue effects fail: {fails}.") };
     Hypothesis {
