@@ -150,7 +150,7 @@ pub enum CaseError {
     },
     /// A dump without a window to compare.
     #[error(
-        "{file}: no calibrated window is in its {octets} octets: it is no dump, its calibrations are missing, or \
+        "{file}: no window of its {octets} octets is calibrated on all three axes: it is no dump, its calibrations are missing, or \
          case.epoch_utc and case.liftoff_clock_s are of another mission"
     )]
     NoWindows {

@@ -48,7 +48,8 @@ pub fn of_signal(scene: &Scene, signal: &Axes, onsets_s: &[f64]) -> Located {
     }
 }
 
-/// The frame in which the signal keeps most to one line, and that line if it carries nine tenths of it.
+/// The frame in which the signal keeps most to one line, and that line if it carries nine tenths of it; it points the way of the largest
+/// values, and where those go both ways it is an axis.
 fn direction(scene: &Scene, signal: &Axes) -> (String, Option<[f64; 3]>) {
     let rotations: [(&str, &dyn Fn(usize) -> Mat3); 4] = [
         ("body", &|_| Mat3::identity()),
@@ -56,12 +57,16 @@ fn direction(scene: &Scene, signal: &Axes) -> (String, Option<[f64; 3]>) {
         ("inertial", &|g| scene.body[g].transpose()),
         ("sun", &|g| sun_frame(scene, g) * scene.body[g].transpose()),
     ];
+    let turned = |rotation: &&dyn Fn(usize) -> Mat3, i: usize| {
+        let t = scene.clock_s()[i];
+        let g = scene.grid_s.partition_point(|x| *x < t).min(scene.grid_s.len() - 1);
+        rotation(g) * Vec3::new(signal[0][i], signal[1][i], signal[2][i])
+    };
     let mut best = ("body", 0.0, Vec3::zeros());
     for (name, rotation) in rotations {
         let mut outer = Mat3::zeros();
-        for (i, t) in scene.clock_s().iter().enumerate() {
-            let g = scene.grid_s.partition_point(|x| x < t).min(scene.grid_s.len() - 1);
-            let v = rotation(g) * Vec3::new(signal[0][i], signal[1][i], signal[2][i]);
+        for i in 0..scene.clock_s().len() {
+            let v = turned(&rotation, i);
             outer += v * v.transpose();
         }
         let trace = outer.trace();
@@ -76,7 +81,12 @@ fn direction(scene: &Scene, signal: &Axes) -> (String, Option<[f64; 3]>) {
             best = (name, share, eigen.eigenvectors.column(top).into_owned());
         }
     }
-    (best.0.to_string(), (best.1 > 0.9).then(|| [best.2.x, best.2.y, best.2.z]))
+    // Of the two ways along the line the one that the largest of it goes.
+    let rotation = rotations.iter().find(|(name, _)| *name == best.0).map(|(_, rotation)| rotation);
+    let along = |i: usize| rotation.map_or(0.0, |rotation| best.2.dot(&turned(rotation, i)));
+    let way: f64 = (0..scene.clock_s().len()).map(|i| along(i).powi(3)).sum();
+    let line = if way < 0.0 { -best.2 } else { best.2 };
+    (best.0.to_string(), (best.1 > 0.9).then(|| [line.x, line.y, line.z]))
 }
 
 fn lvlh(scene: &Scene, g: usize) -> Mat3 {

@@ -2,8 +2,8 @@
 //! or the windows of a station as it stands.
 //!
 //! Only whole windows of normal mode with a calibration around them are used; where the records named a wrong range the
-//! corrected value is. The covariance of the bias law comes along: what it leaves open is slow and the same in all windows, and no
-//! finding.
+//! corrected value is. The covariance of the bias law and the error of the scale factor come along: what they leave open is the same in all
+//! windows, and no finding.
 
 use nalgebra::DMatrix;
 use rapidhash::v3::rapidhash_v3;
@@ -13,11 +13,12 @@ use super::error::CaseError;
 use super::noise::{Flip, Flips, dot};
 use crate::ingest::wire::{PlaybackPart, PlaybackReader};
 use crate::math::rms::about_mean;
+use crate::math::robust::rounding_error_trimmed;
 use crate::pipeline::calibration::{
     Anomaly, Bias, BiasMeasurement, Calibration, Provenance, bias_law::PARAMETERS, saturation,
 };
 use crate::pipeline::station::{Station, replay};
-use crate::pipeline::window::Window;
+use crate::pipeline::window::{AxisWindow, Window};
 use crate::pipeline::{Ledger, PlaybackId, Product, Settings};
 use crate::telemetry::{Mode, Quality, Range};
 use crate::units::MissionTime;
@@ -52,16 +53,17 @@ pub struct Taken {
 /// leaves open there is a nuisance of the fit as everywhere: four hours at either end of a day are not given away.
 const FORGIVEN: Quality = Quality::RANGE_CORRECTED.with_if(Quality::EXTRAPOLATED, true);
 
-/// Whether the scale factor of every axis is measured in the range it is in, or known without error: one that is configured for the
-/// instrument at large, as before the first scale calibration, may be off by several percent, and that would be found.
-fn is_scaled(calibration: &Calibration, ranges: [Option<Range>; 3]) -> bool {
-    let is_measured = |(axis, range): (usize, Option<Range>)| {
-        let scale = range.map(|range| &calibration.scale[axis][range.index()]);
-        scale.is_some_and(|scale| {
-            matches!(scale.provenance, Provenance::Measured | Provenance::CarriedOver) || scale.sigma == 0.0
-        })
+/// A window whose mean the rounding to whole counts may have moved by more than this share of its statistical error is left out: what it
+/// moves follows the signal from window to window, and would be found. It happens in range A, of which a count is 300 ng and more.
+const ROUNDED_AWAY: f64 = 0.5;
+
+/// Whether counts are fine enough for what scatters in a window, on every axis.
+fn is_resolved(window: &Window) -> bool {
+    let resolved = |axis: &AxisWindow| {
+        let estimate = &axis.estimate;
+        rounding_error_trimmed(estimate.winsorised_sd) < ROUNDED_AWAY * estimate.independent_standard_error()
     };
-    ranges.into_iter().enumerate().all(is_measured)
+    window.axes.iter().flatten().all(resolved)
 }
 
 /// The windows of a station that a diagnosis may use, with their deviations on the body axes, ng.
@@ -70,7 +72,7 @@ fn usable_windows(station: &Station) -> impl Iterator<Item = (&Window, &Product,
     station.windows().zip(station.products()).filter_map(move |(window, product)| {
         let calibration = calibration?;
         let may = product.quality.is_good_but_for(FORGIVEN)
-            && is_scaled(calibration, product.range)
+            && is_resolved(window)
             && product.mode == Mode::Normal
             && product.acceleration.whole().is_some();
         let deviation_ng = if may { deviation_ng(calibration, window, product) } else { None };
@@ -148,6 +150,7 @@ impl Taken {
         let Self { mut recording, conditions, calibration, measurements } = self;
         if let Some(calibration) = calibration {
             recording.bias_errors_ng = OARE_AXIS.map(|axis| bias_errors(&calibration, axis, &conditions));
+            recording.scale_errors = OARE_AXIS.map(|axis| scale_errors(&calibration, axis, &conditions));
             recording.bias_laws = std::array::from_fn(|k| bias_laws(&calibration, k, &measurements, &conditions));
         }
         recording
@@ -159,6 +162,26 @@ pub const ALL_TIME: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// Clock at the centre of a window, its temperature, C, and the range of each axis.
 type Conditions = (f64, f64, [Option<Range>; 3]);
+
+/// An unmeasured scale factor is open by this share at least: those of the ranges of one axis differ by up to five percent, those of
+/// instruments by more.
+const UNMEASURED_SHARE: f64 = 0.1;
+
+/// The relative errors of the scale factors of an OARE axis, range by range. One that this record did not measure, configured for the
+/// instrument at large or taken from another range, is hardly known.
+fn scale_errors(calibration: &Calibration, axis: usize, windows: &[Conditions]) -> Vec<Vec<f64>> {
+    let of_range = |range: Range| {
+        let scale = calibration.scale[axis][range.index()];
+        let measured = matches!(scale.provenance, Provenance::Measured | Provenance::CarriedOver);
+        let share = match scale.sigma / scale.correction {
+            known if measured || known == 0.0 => known,
+            open => open.max(UNMEASURED_SHARE),
+        };
+        let is_in = |(_, _, ranges): &Conditions| ranges[axis] == Some(range);
+        windows.iter().map(|at| if is_in(at) { share } else { 0.0 }).collect::<Vec<f64>>()
+    };
+    Range::ALL.map(of_range).into_iter().filter(|series| series.iter().any(|share| *share > 0.0)).collect()
+}
 
 /// What the bias laws of an OARE axis leave open at the windows, ng: those of one range are nothing to the windows of another.
 fn bias_errors(calibration: &Calibration, axis: usize, windows: &[Conditions]) -> Vec<Vec<f64>> {
@@ -249,7 +272,7 @@ fn principal(errors: &[Vec<f64>]) -> Vec<Vec<f64>> {
 
 /// A bias error that varies less is left out, ng rms: over a day of the quietest windows known, 25 ng of noise, it has an SNR of
 /// half a standard deviation.
-const NEGLIGIBLE_NG: f64 = 0.25;
+pub(super) const NEGLIGIBLE_NG: f64 = 0.25;
 
 /// A case whose files somebody has by their names, `None` where there is no such file; a dump is taken through the pipeline. `set` are
 /// `key=value` overrides of `case.toml`.
@@ -343,8 +366,6 @@ fn deviation_ng(calibration: &Calibration, window: &Window, product: &Product) -
 mod tests {
     use super::*;
     use crate::ingest::wire::FrameRefusal;
-    use crate::pipeline::Settings;
-    use crate::pipeline::calibration::{KnownCalibration, Scale};
     use crate::units::Clock;
 
     #[test]
@@ -359,28 +380,5 @@ mod tests {
         account.frames_refused.insert(FrameRefusal::Fecf, 3);
         let told = "of what came down 3 of 40 frames are refused (fecf 3); 30 s have no science record (gaps: 1)";
         assert_eq!(not_come(&ledger).as_deref(), Some(told));
-    }
-
-    #[test]
-    fn an_axis_whose_scale_factor_is_not_measured_is_not_calibrated() {
-        let (scale, law) = ([[1.1; 3]; 3], [[[0.0, 0.0, 0.0, 0.0, 10.0, 100.0]; 3]; 3]);
-        let known = serde_json::json!({ "scale_correction": scale, "bias_law_coefficients": law });
-        let mut calibration = KnownCalibration::parse(&known.to_string()).unwrap().calibration(&Settings::sts65());
-        let ranges = [Some(Range::C), Some(Range::B), Some(Range::C)];
-        assert!(is_scaled(&calibration, ranges), "known without error");
-        let scale = |provenance| Scale { correction: 1.1, sigma: 0.01, provenance };
-        for (provenance, usable) in [
-            (Provenance::Configured, false),
-            (Provenance::FromRangeB, false),
-            (Provenance::CarriedOver, true),
-            (Provenance::Measured, true),
-        ] {
-            calibration.scale[2][Range::C.index()] = scale(provenance);
-            assert_eq!(is_scaled(&calibration, ranges), usable, "{provenance:?}");
-        }
-        // What no axis is in does not matter.
-        calibration.scale[1][Range::C.index()] = scale(Provenance::Configured);
-        assert!(is_scaled(&calibration, ranges));
-        assert!(!is_scaled(&calibration, [None, Some(Range::B), Some(Range::C)]), "an axis without a range");
     }
 }

@@ -8,15 +8,17 @@ mod angles;
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
+use crate::math::rms::{about_mean, rms_about_mean};
 use crate::math::shared_work;
 use crate::physics::{self, Mat3, Vec3};
 use crate::units::NANO_G_M_S2;
 
-use super::case::{Case, Expectation, HALF_WINDOW_S};
+use super::case::{Case, Expectation, HALF_WINDOW_S, Recording};
 use super::earlier;
 use super::error::CaseError;
 use super::measure::{Measurement, coverage, union};
 use super::noise::{self, Contradicted, Flips, Loudness, Schedule};
+use super::recorder::NEGLIGIBLE_NG;
 
 pub use super::axes::Axes;
 
@@ -236,7 +238,7 @@ impl<'a> Scene<'a> {
         let residual_ng: Axes =
             std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
         Self {
-            schedule: Schedule::new(windows).with_shared(case.recording.bias_errors_ng.clone()).with_flips(
+            schedule: Schedule::new(windows).with_shared(shared_errors(&case.recording, &simulated_ng)).with_flips(
                 case.recording.bias_laws.each_ref().map(|laws| laws.iter().map(|law| &law.flips).collect()),
             ),
             loudness,
@@ -326,6 +328,19 @@ impl<'a> Scene<'a> {
         let clock = self.clock_s();
         [clock[0] - HALF_WINDOW_S, clock[clock.len() - 1] + HALF_WINDOW_S]
     }
+}
+
+/// What the calibration leaves open, the same in all windows, ng: of the scale factor in proportion to what is expected, for what was
+/// recorded holds the noise that is to be explained.
+fn shared_errors(recording: &Recording, simulated_ng: &Axes) -> [Vec<Vec<f64>>; 3] {
+    std::array::from_fn(|k| {
+        let of_scale = recording.scale_errors[k].iter().map(|shares| {
+            let errors: Vec<f64> = shares.iter().zip(&simulated_ng[k]).map(|(share, ng)| share * ng).collect();
+            about_mean(&errors)
+        });
+        let told = of_scale.filter(|errors| rms_about_mean(errors) > NEGLIGIBLE_NG);
+        recording.bias_errors_ng[k].iter().cloned().chain(told).collect()
+    })
 }
 
 /// Whether the crew sleeps, by its log, about the middle of the samples that each window is the first to have.

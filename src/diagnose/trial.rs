@@ -222,10 +222,13 @@ impl<'a> Trial<'a> {
             }
             let left = test.frame.data.less(&p, 1.0);
             for k in 0..3 {
+                // The constant goes with the amplitudes: both are those of the other parts.
+                let beside = |i: &usize| self.scene.residual_ng[k][*i] - predicted[k][*i];
+                let constant = train.index.iter().map(beside).sum::<f64>() / train.index.len() as f64;
                 let (b, a) = (test.frame.data.projected(k, &test.frame), left.projected(k, &test.frame));
                 for (place, i) in test.index.iter().enumerate() {
                     *block_gain.entry(division.block[*i]).or_default() += 0.5 * (b[place].powi(2) - a[place].powi(2));
-                    after[k][*i] -= predicted[k][*i];
+                    after[k][*i] -= predicted[k][*i] + constant;
                 }
             }
         }

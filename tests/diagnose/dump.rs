@@ -4,11 +4,14 @@ use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
 use oare_ground::ingest::wire::LinkConfig;
+use oare_ground::ingest::wire::record::Record;
 use oare_ground::physics::Vec3;
 use oare_ground::simulate::expected::case_files;
 use oare_ground::simulate::forces::Push;
+use oare_ground::simulate::noise::NoisePlan;
 use oare_ground::simulate::recorder::{RecorderConfig, frames};
 use oare_ground::simulate::{Fault, Mission, MissionConfig, playbacks};
+use oare_ground::telemetry::{AccRecord, Mode};
 
 fn answer(kind: Kind, seed: u64, only: Option<&'static str>) -> Diagnosis {
     let manner = Manner { dump: true, ..Manner::default() };
@@ -51,10 +54,19 @@ fn files(hours: f64, faults: Vec<Fault>) -> Vec<(String, Vec<u8>)> {
 
 /// The files of a flight.
 fn files_of(config: MissionConfig) -> Vec<(String, Vec<u8>)> {
+    files_of_what_came(config, |_| true)
+}
+
+/// The files of a flight of which only some science records came down.
+fn files_of_what_came(config: MissionConfig, came: impl Fn(&AccRecord) -> bool) -> Vec<(String, Vec<u8>)> {
     let seed = config.seed;
     let mission = Mission::new(config).unwrap();
     let link = LinkConfig::default();
-    let passes = playbacks(&frames(mission.fly(), link), &link, &RecorderConfig::clean(), seed);
+    let flown = mission.fly().map(|mut second| {
+        second.sent.retain(|sent| !matches!(&sent.record, Record::Acc(record) if !came(record)));
+        second
+    });
+    let passes = playbacks(&frames(flown, link), &link, &RecorderConfig::clean(), seed);
     let mut files: Vec<(String, Vec<u8>)> = case_files(&mission, "with-fault", "recording.dump")
         .unwrap()
         .into_iter()
@@ -94,6 +106,33 @@ fn records_that_name_a_wrong_range_are_an_effect_with_their_span() {
     assert!(found.notes.contains(&effect.why), "{:?}", found.notes);
     let json = serde_json::to_string(&found).unwrap();
     assert!(!json.contains("\"confirmed\":null"), "what is not known is absent");
+}
+
+/// In the quietest records, where a count of range A is more than what scatters, the means of the corrected windows follow the signal in
+/// steps: that is the fault, and no physics.
+#[test]
+fn a_wrong_range_of_a_quiet_record_is_the_only_finding() {
+    for seed in [5, 6] {
+        let faults = vec![Fault::RangeMisreport { from_clock_s: 40_000, seconds: 5400 }];
+        let config = MissionConfig { faults, noise: NoisePlan::quiet(), ..MissionConfig::sts65(seed, 16.0) };
+        let found = diagnose(&super::case(&files_of(config)), &Settings::default()).unwrap();
+        let ids: Vec<&str> = found.effects.iter().map(|effect| effect.id.as_str()).collect();
+        assert_eq!((found.verdict, &ids[..]), (Verdict::Explained, &["range_misreport"][..]), "{seed}: {found:?}");
+    }
+}
+
+/// A record in which no scale factor was measured is compared all the same; that of the instrument at large is hardly known, and its
+/// error is no finding.
+#[test]
+fn a_dump_without_a_scale_calibration_is_a_case() {
+    for (seed, off) in [(5, 1.0), (6, 1.04), (7, 0.96)] {
+        let mut config = MissionConfig::sts65(seed, 12.0);
+        config.instrument.scale_correction.iter_mut().flatten().for_each(|correction| *correction *= off);
+        let case = super::case(&files_of_what_came(config, |record| record.mode != Mode::Scale));
+        assert!(case.recording.scale_errors.iter().all(|axis| axis.iter().flatten().any(|share| *share >= 0.1)));
+        let found = diagnose(&case, &Settings::default()).unwrap();
+        assert_eq!(found.verdict, Verdict::Consistent, "{seed}: {found:?}");
+    }
 }
 
 /// A bias that steps is seen by the calibrations behind it, and the law takes what it can of it: what is left in the windows, by two flights of

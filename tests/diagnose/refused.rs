@@ -181,7 +181,7 @@ fn a_dump_without_a_window_says_so() {
     let (_, dump) = files.iter_mut().find(|(name, _)| name == "recording.dump").unwrap();
     dump.clear();
     assert!(
-        read(&files).err().unwrap_or_default().starts_with("recording.dump: no calibrated window is in its 0 octets")
+        read(&files).err().unwrap_or_default().starts_with("recording.dump: no window of its 0 octets is calibrated")
     );
 }
 

@@ -59,6 +59,7 @@ mod tests {
             a_ng: std::array::from_fn(axis),
             dev_ng: std::array::from_fn(|_| vec![1.0; 400]),
             bias_errors_ng: [const { Vec::new() }; 3],
+            scale_errors: [const { Vec::new() }; 3],
             bias_laws: [const { Vec::new() }; 3],
             faults: Vec::new(),
             not_come: None,

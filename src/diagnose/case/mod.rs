@@ -56,6 +56,8 @@ pub struct Recording {
     pub dev_ng: [Vec<f64>; 3],
     /// What the calibration leaves open, per axis: series whose true sizes are independent and standard normal, ng.
     pub bias_errors_ng: [Vec<Vec<f64>>; 3],
+    /// The same of its scale factors, as shares of the value.
+    pub scale_errors: [Vec<Vec<f64>>; 3],
     /// The bias laws that were fitted to the dump itself, per axis: what they take from a bias of the sensor.
     pub bias_laws: [Vec<FittedLaw>; 3],
     /// What was wrong with the instrument, as far as its own dump tells.
@@ -357,6 +359,7 @@ fn take(recording: &Recording, keep: &[usize]) -> Recording {
         a_ng: std::array::from_fn(|k| pick(&recording.a_ng[k])),
         dev_ng: std::array::from_fn(|k| pick(&recording.dev_ng[k])),
         bias_errors_ng: recording.bias_errors_ng.each_ref().map(|axis| axis.iter().map(pick).collect()),
+        scale_errors: recording.scale_errors.each_ref().map(|axis| axis.iter().map(pick).collect()),
         bias_laws: recording.bias_laws.each_ref().map(|axis| axis.iter().map(|law| law.at(keep)).collect()),
         faults: recording.faults.clone(),
         not_come: recording.not_come.clone(),

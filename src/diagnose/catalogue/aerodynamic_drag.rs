@@ -19,7 +19,8 @@ pub const EFFECT: Effect = Effect {
     signature,
     exact_at: None,
     assumes: None,
-    why: "The residual points against the velocity and scales with the modelled drag.",
+    why: "The residual scales with the modelled drag: it points against the velocity where the fraction is positive and drag is missing, along \
+          it where the fraction is negative and the simulation has too much.",
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {

@@ -20,7 +20,8 @@ pub const EFFECT: Effect = Effect {
     signature,
     exact_at: None,
     assumes: None,
-    why: "The residual lies along the drag, once per orbit, strongest when the vehicle passes the afternoon side: it follows the Sun and not the perigee.",
+    why: "The residual lies along the drag, once per orbit, more drag (less where the amplitude is negative) on the afternoon side than the \
+          simulation has: it follows the Sun and not the perigee.",
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {

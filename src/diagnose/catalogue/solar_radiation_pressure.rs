@@ -13,7 +13,8 @@ pub const EFFECT: Effect = Effect {
     source: "standard; 0.4-2 ng for the Orbiter, more with large panels",
     covariate: "sun_angle",
     mistaken_for: &["temperature_bias, which lags", "diurnal_bulge"],
-    linear: &[Linear { name: "coefficient", unit: "1", size: 4.0, size_max: 40.0, ..Linear::PLAIN }],
+    // A simulation may have what the vehicle has not: a coefficient of two is that of a mirror.
+    linear: &[Linear { name: "coefficient", unit: "1", size: 4.0, size_max: 40.0, least: -2.0, ..Linear::PLAIN }],
     scales: USUAL_OR_SMALL,
     nonlinear: &[],
     grid: one_point,
@@ -21,7 +22,8 @@ pub const EFFECT: Effect = Effect {
     signature,
     exact_at: None,
     assumes: None,
-    why: "The residual points away from the Sun and switches at the edges of the shadow, without lag.",
+    why: "The residual points away from the Sun (towards it where the coefficient is negative: there is more of it in the simulation) and \
+          switches at the edges of the shadow, without lag.",
 };
 
 fn signature(scene: &Scene, _: &super::Theta) -> Option<Shape> {

@@ -24,7 +24,7 @@ pub fn residual(plates: &Plates) -> Drawn {
     timelines(plates, |axis| {
         let mut lines = vec![(GREY, 1, plates.before_ng[axis].as_slice(), "recording less simulation")];
         if plates.model_ng[axis].iter().any(|m| *m != 0.0) {
-            lines.push((RED, 2, plates.model_ng[axis].as_slice(), "what is claimed"));
+            lines.push((RED, 2, plates.model_ng[axis].as_slice(), "what is fitted"));
         }
         lines
     })
@@ -36,7 +36,7 @@ pub fn after(plates: &Plates) -> Drawn {
         return Ok(String::new());
     }
     let left = left(plates);
-    timelines(plates, |axis| vec![(BLUE, 1, left[axis].as_slice(), "left after the claimed part")])
+    timelines(plates, |axis| vec![(BLUE, 1, left[axis].as_slice(), "left after the fitted part")])
 }
 
 fn left(plates: &Plates) -> [Vec<f64>; 3] {

@@ -19,13 +19,13 @@ pub fn page(d: &Diagnosis, plates: &Plates, Figures { shown: figures, missing }:
         figures,
         "residual.svg",
         "Recording less simulation in body axes (10 min means, a constant per axis removed), \
-        the claimed part over it, the Earth's shadow as bands, and the mission log below.",
+        what is fitted over it where anything is, the Earth's shadow as bands, and the mission log below.",
     );
     figure(
         &mut page,
         figures,
         "after.svg",
-        "What is left when the claimed part is taken away, on the scale of the figure above.",
+        "What is left when the fitted part is taken away, on the scale of the figure above.",
     );
     held_out(&mut page, d);
     located(&mut page, d);
@@ -78,8 +78,15 @@ fn under(d: &Diagnosis, plates: &Plates) -> String {
     }
     if let (Some(first), Some(last)) = (plates.clock_s.first(), plates.clock_s.last()) {
         let met = |t: &f64| (t - plates.liftoff_clock_s) / 3600.0;
-        let _ =
-            write!(line, " · {} windows, {:.1} to {:.1} h after lift-off", plates.clock_s.len(), met(first), met(last));
+        let _ = write!(
+            line,
+            " · {} windows, {:.1} to {:.1} h after lift-off · hours are since lift-off, instants in seconds of the instrument clock, by \
+             which lift-off was at {} s",
+            plates.clock_s.len(),
+            met(first),
+            met(last),
+            plates.liftoff_clock_s
+        );
     }
     line
 }

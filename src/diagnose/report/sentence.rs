@@ -69,7 +69,10 @@ fn ambiguous(d: &Diagnosis) -> String {
         .iter()
         .map(|set| set.iter().map(|id| words(id)).collect::<Vec<_>>().join(" with "))
         .collect();
-    let next = d.separating_observation.as_ref().map_or(String::new(), |s| format!(" To decide: {}", s.text.trim()));
+    let next = d
+        .separating_observation
+        .as_ref()
+        .map_or(String::new(), |s| format!(" The cheapest observation that would tell more: {}", s.text.trim()));
     format!(
         "The simulation lacks something, and this recording cannot tell whether it is {}.{next}",
         listed(&sets, "or")

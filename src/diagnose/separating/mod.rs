@@ -324,7 +324,7 @@ fn to_come(scene: &Scene, action: Action, hours: f64) -> Option<(Case, Surroundi
         let usual = dev.last().copied().unwrap_or(1.0);
         dev.resize(dev.len() + windows, usual);
         // What the calibration leaves open now it leaves open then.
-        for error in &mut recording.bias_errors_ng[k] {
+        for error in recording.bias_errors_ng[k].iter_mut().chain(&mut recording.scale_errors[k]) {
             let now = error.last().copied().unwrap_or(0.0);
             error.resize(error.len() + windows, now);
         }

@@ -265,6 +265,9 @@ impl Findings<'_> {
         } else {
             answer.notes.extend(of_assumptions(scene, library, &best.set));
             name(&mut answer, scene, library, &best, &self.listed, &self.solution.open);
+            // A limit is beside the first set: of what another set has in its place it says nothing.
+            let Diagnosis { upper_limits, cannot_tell_apart, .. } = &mut answer;
+            upper_limits.retain(|limit| !cannot_tell_apart.iter().flatten().any(|id| *id == limit.id));
             answer.notes.extend(of_claims(scene, &answer.effects, answer.verdict));
         }
         (answer, signal)
