@@ -23,6 +23,8 @@ pub const BODY_OCTETS_MAX: usize = 64 << 10;
 const URI_OCTETS_MAX: usize = 8 << 10;
 /// Answered without a token: they tell nothing but that the service is there.
 pub(super) const OPEN_PATHS: [&str; 2] = ["/healthz", "/readyz"];
+/// As well: the script and the style of the page, which a browser asks for without its token and which are the same in every program.
+const OPEN_PARTS: &str = "/dashboard/";
 
 /// After so many seconds a client may ask again.
 const AGAIN_S: &str = "1";
@@ -97,7 +99,9 @@ pub async fn refuse_while_reading(State(app): State<Arc<App>>, request: Request,
 
 fn refuse_token(app: &App, request: &Request) -> Option<Response> {
     let token = app.token.as_ref()?;
-    if OPEN_PATHS.contains(&request.uri().path()) || presented(request).iter().any(|found| same(found, token)) {
+    let path = request.uri().path();
+    let is_open = OPEN_PATHS.contains(&path) || path.starts_with(OPEN_PARTS);
+    if is_open || presented(request).iter().any(|found| same(found, token)) {
         return None;
     }
     let detail = "this service needs its token: Authorization: Bearer TOKEN, or ?access_token=TOKEN";

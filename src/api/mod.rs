@@ -23,16 +23,17 @@ use axum::routing::get;
 use axum::{Json, Router, middleware};
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
-use utoipa::PartialSchema;
 use utoipa::openapi::path::Operation;
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, Http, HttpAuthScheme, SecurityRequirement, SecurityScheme};
 use utoipa::openapi::{ContentBuilder, InfoBuilder, OpenApi, OpenApiBuilder, Ref, RefOr, Response};
+use utoipa::{PartialSchema, ToSchema};
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::hub::Hub;
 use crate::hub::desk::Desk;
 use crate::hub::status::Board;
+use crate::hub::wire;
 use crate::ingest::writer::SharedStation;
 use crate::units::MissionTime;
 use parameters::Parameters;
@@ -123,6 +124,12 @@ fn described(openapi: OpenApi, waits_for_the_log: &BTreeSet<String>) -> OpenApi 
     let mut openapi = builder.info(info.build()).build();
     let components = openapi.components.get_or_insert_default();
     components.schemas.insert("Problem".into(), problem::Document::schema());
+    // What WebSocket messages hold, beside their own members: no route answers with them.
+    let mut of_messages = vec![(wire::Window::name().into(), wire::Window::schema())];
+    of_messages.push((wire::RawSecond::name().into(), wire::RawSecond::schema()));
+    wire::Window::schemas(&mut of_messages);
+    wire::RawSecond::schemas(&mut of_messages);
+    of_messages.into_iter().for_each(|(name, schema)| _ = components.schemas.entry(name).or_insert(schema));
     let in_query = ApiKey::Query(ApiKeyValue::new(parameters::TOKEN));
     for (name, scheme) in [
         ("bearer", SecurityScheme::Http(Http::new(HttpAuthScheme::Bearer))),

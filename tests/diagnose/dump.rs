@@ -192,6 +192,26 @@ fn an_epoch_that_is_not_that_of_the_records_is_told() {
 
 /// Half a day is short for a leak, and the errors of the bias that all windows share are large: at the noise of a step it is out of reach.
 #[test]
+fn a_leak_that_begins_just_before_a_calibration_is_one_and_no_push() {
+    for seed in [23, 28] {
+        let mut config = MissionConfig::sts65(seed, 36.0);
+        config.forces.pushes.push(Push {
+            from_clock_s: 90_000.0,
+            until_clock_s: f64::INFINITY,
+            tau_s: Some(9000.0),
+            body_ng: Vec3::new(250.0, -190.0, 160.0),
+        });
+        let found = diagnose(&super::case(&files_of(config)), &Settings::default()).unwrap();
+        let [leak] = &found.effects[..] else { panic!("{seed}: {found:?}") };
+        assert_eq!((found.verdict, leak.id.as_str()), (Verdict::Explained, "vent_leak"), "{seed}");
+        for (name, truth) in [("onset_s", 90_000.0), ("tau_s", 9000.0)] {
+            let of_leak = leak.parameters.iter().find(|parameter| parameter.name == name).unwrap();
+            assert!((of_leak.value - truth).abs() < 4.0 * of_leak.sigma, "{seed}: {of_leak:?}, and it was {truth}");
+        }
+    }
+}
+
+#[test]
 fn a_leak_in_half_a_day_is_no_step() {
     for seed in [101, 104, 106] {
         let mut config = MissionConfig::sts65(seed, 12.0);

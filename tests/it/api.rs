@@ -63,6 +63,10 @@ async fn every_named_route_answers_and_is_described() {
     }
     assert!(openapi["components"]["schemas"]["Problem"]["properties"]["detail"].is_object());
     assert_eq!(openapi["components"]["securitySchemes"]["query"]["name"], "access_token");
+    let window = &openapi["components"]["schemas"]["Window"].to_string();
+    for word in ["range_corrected", "extrapolated", "uncalibrated", "table_moving", "q_x", "known_since_clock_s"] {
+        assert!(window.contains(word), "{word} is not described: {window}");
+    }
     for path in ["/gaps", "/playbacks", "/events", "/anomalies", "/calibration/history", "/status", "/accel/history"] {
         running.get(path).await;
     }
@@ -100,7 +104,13 @@ async fn a_configured_token_is_needed_everywhere_but_for_health() {
         assert_eq!(answer.status(), 401, "{path}");
         assert!(answer.headers().contains_key("www-authenticate"));
     }
-    assert_eq!(reqwest::get(running.url("/healthz")).await.unwrap().status(), 200);
+    // A browser asks for the parts of the page without the token that the page was asked with.
+    let page = reqwest::get(running.url(&format!("/?access_token={TOKEN}"))).await.unwrap().text().await.unwrap();
+    let parts: Vec<&str> = page.split('"').filter(|part| part.starts_with("dashboard/")).collect();
+    assert_eq!(parts.len(), 4, "{parts:?}");
+    for path in parts.iter().map(|part| format!("/{part}")).chain(["/healthz".into()]) {
+        assert_eq!(reqwest::get(running.url(&path)).await.unwrap().status(), 200, "{path}");
+    }
     let client = reqwest::Client::new();
     let with_header = |token: &str| client.get(running.url("/status")).bearer_auth(token).send();
     assert_eq!(with_header(TOKEN).await.unwrap().status(), 200);

@@ -1,12 +1,12 @@
 // The dashboard: history first, then live over the WebSocket. Everything shown comes from the service's own interface.
 "use strict";
 
-const WINDOW_S = 50, STEP_S = 25, WHOLE_WITHIN_S = 600, POINTS_MAX = 60000, REFRESH_MS = 3000;
+const WINDOW_S = 50, STEP_S = 25, WHOLE_WITHIN_S = 600, EVENTS_MAX = 100, POINTS_MAX = 60000, REFRESH_MS = 3000;
 const token = new URLSearchParams(location.search).get("access_token");
 const withToken = (path) => token ? path + (path.includes("?") ? "&" : "?") + "access_token=" + encodeURIComponent(token) : path;
 const get = async (path) => {
   const answer = await fetch(withToken(path));
-  if (!answer.ok) throw new Error(`${path}: ${answer.status}`);
+  if (!answer.ok) throw Object.assign(new Error(`${path}: ${answer.status}`), { status: answer.status });
   return answer.json();
 };
 const byId = (id) => document.getElementById(id);
@@ -73,10 +73,20 @@ function draw() {
   drawNow();
 }
 
+function drawNothing() {
+  for (const axis of ["x", "y", "z"]) {
+    byId("a" + axis).textContent = byId("s" + axis).textContent = ng(null);
+    byId("a" + axis).dataset.ng = "";
+  }
+  delete byId("now").dataset.revision;
+  byId("when").textContent = "no calibrated window yet";
+  byId("quality").textContent = "";
+}
+
 // ---- the latest value ---------------------------------------------------------------------------------------------
 function drawNow() {
   const latest = latestWindow();
-  if (!latest) return;
+  if (!latest) return drawNothing();
   for (const axis of ["x", "y", "z"]) {
     const cell = byId("a" + axis), value = latest[`a${axis}_ng`];
     cell.textContent = ng(value);
@@ -203,10 +213,12 @@ function showCalibration(calibration) {
 }
 
 function showNotices(events, anomalies) {
+  // What is odd comes first, all of it; of the many events that are not, the last.
+  const newestFirst = (a, b) => b.at - a.at;
   const all = [
-    ...events.map((e) => ({ at: e.clock_s, odd: false, text: `${e.event.replaceAll("_", " ")} ${e.text}` })),
-    ...anomalies.map((a) => ({ at: a.from_clock_s, odd: true, text: a.sentence })),
-  ].sort((a, b) => b.at - a.at).slice(0, 100);
+    ...anomalies.map((a) => ({ at: a.from_clock_s, odd: true, text: a.sentence })).sort(newestFirst),
+    ...events.map((e) => ({ at: e.clock_s, odd: false, text: `${e.event.replaceAll("_", " ")} ${e.text}` })).sort(newestFirst).slice(0, EVENTS_MAX),
+  ];
   byId("notices").replaceChildren(...all.map((notice) => {
     const item = document.createElement("li");
     item.className = notice.odd ? "odd" : "";
@@ -221,7 +233,9 @@ const significant = (x) => Math.abs(x) >= 1e5 ? Math.round(x).toLocaleString("en
 const spanText = (s) => s === null ? null : s < 7200 ? `${Math.round(s / 60)} min` : `${(s / 3600).toFixed(1)} h`;
 
 async function refreshDiagnosis() {
-  const answer = await get("/diagnosis").catch(() => null);
+  // What was said stands while nobody answers; a service that has none says so by 404.
+  const answer = await get("/diagnosis").catch((error) => error.status === 404 ? null : undefined);
+  if (answer === undefined) return;
   byId("diagnosis").hidden = !answer;
   if (!answer) return;
   const p = answer.progress, kinds = { consistent: "good", explained: "bad", ambiguous: "wait", unexplained: "bad" };
@@ -250,12 +264,20 @@ async function refreshDiagnosis() {
 // ---- live -------------------------------------------------------------------------------------------------------------
 let lastSeq = null;
 
+// Of another service's windows nothing stays.
+function forget() {
+  windows.clear();
+  newest = whole = null;
+  dirty = true;
+}
+
 function live() {
   // All of history the first time; after a broken connection, what came since.
-  const from = lastSeq === null ? "-4294967296" : "seq:" + lastSeq;
+  const anew = lastSeq === null;
+  const from = anew ? "-4294967296" : "seq:" + lastSeq;
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   const socket = new WebSocket(withToken(`${scheme}://${location.host}/accel/live?from=${from}&topics=window,calibration,diagnosis`));
-  socket.onopen = () => chip("link", "live", "good");
+  socket.onopen = () => { if (anew) forget(); chip("link", "live", "good"); };
   socket.onmessage = (frame) => {
     const message = JSON.parse(frame.data);
     lastSeq = message.seq;

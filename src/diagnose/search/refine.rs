@@ -3,7 +3,8 @@
 use super::peaks::Peak;
 use super::volume::volume;
 use super::{Entry, Member, Set, Whitened, point_at, whiten, whiten_all};
-use crate::diagnose::catalogue::{Shape, Theta};
+use crate::diagnose::case::HALF_WINDOW_S;
+use crate::diagnose::catalogue::{ONSET, Shape, Theta};
 use crate::diagnose::design::{Chosen, Frame};
 use crate::diagnose::optimise::nelder_mead;
 use crate::diagnose::scene::Scene;
@@ -38,9 +39,20 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
             free.iter().zip(p).for_each(|(j, x)| t[*j] = *x);
             t
         };
-        let refined = place(&nelder_mead(&start, &steps, 60, |p| -gain(&place(p))));
+        let from = |start: &[f64], steps: &[f64]| nelder_mead(start, steps, 60, |p| -gain(&place(p)));
+        let refined = from(&start, &steps);
+        // What begins in a hole of the record is the same wherever it does; downhill from there nobody comes to its near side.
+        let mut beyond_holes = Vec::new();
+        if let Some(j) = free.iter().position(|j| effect.nonlinear[*j].name == ONSET.name) {
+            for before_s in before_holes(scene.clock_s(), refined[j]) {
+                let (mut start, mut steps) = (refined.clone(), steps.clone());
+                (start[j], steps[j]) = (before_s, HALF_WINDOW_S);
+                beyond_holes.push(place(&from(&start, &steps)));
+            }
+        }
         let atom = entry.atom();
-        let places = [Some(theta), Some(refined), atom].into_iter().flatten().map(|theta| (gain(&theta), theta));
+        let known = [Some(theta), Some(place(&refined)), atom].into_iter().flatten();
+        let places = known.chain(beyond_holes).map(|theta| (gain(&theta), theta));
         let best = places.filter(|(gain, _)| gain.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((peak, theta)) = best else { continue };
         let (log_share, sigma) = volume(&gain, &theta, &free, effect, (effect.log_density)(scene, &theta), peak);
@@ -55,6 +67,18 @@ pub fn refine(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set) {
         }
     }
     set.weigh(frame, entries);
+}
+
+/// Without a window for so long the record has a hole, s; and how far from one an onset may have been drawn into it.
+const HOLE_S: f64 = 120.0;
+const NEAR_S: f64 = 1800.0;
+
+/// Onsets just before the holes that are near one: of the last window before a hole half is behind it.
+fn before_holes(clock_s: &[f64], onset_s: f64) -> Vec<f64> {
+    let from = clock_s.partition_point(|t| *t < onset_s - NEAR_S);
+    let to = clock_s.partition_point(|t| *t < onset_s + NEAR_S);
+    let steps = clock_s[from..(to + 1).min(clock_s.len())].windows(2);
+    steps.filter(|step| step[1] - step[0] > HOLE_S).map(|step| step[0]).collect()
 }
 
 /// What the starting points of an entry explain beside a chosen set.
@@ -89,5 +113,21 @@ fn follow(scene: &Scene, frame: &Frame, entries: &[Entry], set: &mut Set, i: usi
         let Some(point) = point_at(scene, frame, entry, m, &theta).filter(|_| moved) else { return };
         (set.members[i].theta, set.members[i].point) = (theta, point);
         set.weigh(frame, entries);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_onset_is_tried_before_the_holes_that_are_near_it_alone() {
+        let clock_s: Vec<f64> =
+            (0..400).map(|i| 25.0 * f64::from(i)).filter(|t| !(2000.0..3000.0).contains(t) && *t != 5000.0).collect();
+        assert_eq!(before_holes(&clock_s, 3000.0), [1975.0]);
+        assert_eq!(before_holes(&clock_s, 1500.0), [1975.0]);
+        assert_eq!(before_holes(&clock_s, 6000.0), [0.0; 0]);
+        assert_eq!(before_holes(&clock_s, 1e6), [0.0; 0]);
+        assert_eq!(before_holes(&[], 0.0), [0.0; 0]);
     }
 }

@@ -4,6 +4,7 @@
 
 use crate::diagnose::answer::Interval;
 use crate::diagnose::case::HALF_WINDOW_S;
+use crate::diagnose::catalogue::Theta;
 use crate::diagnose::design::{Column, Frame, Raw};
 use crate::diagnose::model::entry_columns;
 use crate::diagnose::optimise::nelder_mead;
@@ -107,14 +108,26 @@ fn in_place_of(
         (0..set.members.len()).filter(|j| *j != i && Some(*j) != step).map(|j| set.members[j].clone()).collect();
     let beside = others.chosen(frame);
     let sized = |column: (&Raw, &f64)| frame.column(column.0, *column.1);
-    let mut named: Vec<Column> = Vec::new();
-    for member in [Some(i), step].into_iter().flatten().map(|j| &set.members[j]) {
-        let columns = entry_columns(scene, &library.entries[member.entry], &member.theta)?;
-        named.extend(columns.iter().zip(&member.sizes(&library.entries)).map(sized));
-    }
+    let columns_of = |member: &Member, theta: &Theta| -> Option<Vec<Column>> {
+        let columns = entry_columns(scene, &library.entries[member.entry], theta)?;
+        Some(columns.iter().zip(&member.sizes(&library.entries)).map(sized).collect())
+    };
+    let of_step = step.map_or(Some(Vec::new()), |j| columns_of(&set.members[j], &set.members[j].theta))?;
+    let of_leak = |theta: &Theta| -> f64 {
+        let columns = columns_of(leak, theta).map(|mut named| {
+            named.extend(of_step.iter().cloned());
+            named
+        });
+        columns.map_or(f64::NEG_INFINITY, |named| beside.gain(&named))
+    };
+    // The leak of the search was the likeliest beside what was chosen then; the courses are refined, and so must it be.
+    let from = [leak.theta[0], leak.theta[1]];
+    let steps = [STEP * leak.theta[1].exp(), STEP];
+    let refined_leak = nelder_mead(&from, &steps, EVALUATIONS, |at| -of_leak(&[at[0], at[1]]));
+    let of_leak = of_leak(&leak.theta).max(of_leak(&[refined_leak[0], refined_leak[1]]));
     // A step beside a leak has its own prior odds, and an instant of its own.
     let paid = |member: &Member| library.entries[member.entry].log_prior + member.log_occam;
-    let of_named = beside.gain(&named) + step.map_or(0.0, |j| paid(&set.members[j]));
+    let of_named = of_leak + step.map_or(0.0, |j| paid(&set.members[j]));
     let columns = |course: &Course, span: Span| -> Vec<Column> {
         let series = course.series(clock_s, span);
         sizes.iter().enumerate().map(|(axis, size)| frame.scalar(axis, &series, *size)).collect()
