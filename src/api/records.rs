@@ -120,7 +120,7 @@ pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
     responses((status = 200, body = Object, description = "the members of diagnosis.json, verdict and false_alarm_probability null while \
         there is no answer; of a running diagnosis also `progress`: state (collecting, searching, current, refused, failed), sentence, \
         windows_seen, windows_beyond, windows_searched, first_clock_s, last_clock_s, revision, calibration, inputs, at_rest, \
-        time_to_detect_s, time_to_name_s, counted_from (onset, logged_start, first_data), counted_from_clock_s, searches, alarm_clock_s, \
+        time_to_detect_s, time_to_name_s, counted_from (onset, logged_start, first_data), counted_from_clock_s, name_counted_from_clock_s, searches, alarm_clock_s, \
         name_clock_s, name, alarm_came_at_once, name_came_at_once, alarms_withdrawn, searches_failed, looks"),
         (status = 404, description = "there is none"), (status = 500, description = "the file that lies there is no JSON")))]
 pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Response, Problem> {

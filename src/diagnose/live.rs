@@ -215,10 +215,9 @@ impl Live {
     pub fn report(&self, seen: &Seen, is_searching: bool) -> Report {
         let windows_seen = seen.windows + seen.beyond;
         let answer = self.answer.as_ref();
-        let (counted_from, from) = answer.map_or((CountedFrom::FirstData, None), |answer| {
-            began(&self.expected, &answer.diagnosis.effects, answer.span_s[0])
-        });
-        let since = |clock_s: Option<f64>| Some((clock_s? - from?).max(0.0));
+        let began = answer.map(|answer| began(&self.expected, &answer.diagnosis.effects, answer.span_s[0]));
+        let [from, name_from] = [began.map(|began| began.first_s), began.map(|began| began.last_s)];
+        let since = |clock_s: Option<f64>, from: Option<f64>| Some((clock_s? - from?).max(0.0));
         let mut sentence = match self.state {
             State::Collecting => waiting_sentence(seen.windows),
             _ => self.sentence.clone(),
@@ -240,10 +239,11 @@ impl Live {
             calibration: answer.map_or(0, |answer| answer.calibration),
             inputs: digits(self.inputs),
             at_rest,
-            time_to_detect_s: since(self.milestones.alarm_clock_s),
-            time_to_name_s: since(self.milestones.name_clock_s),
-            counted_from,
+            time_to_detect_s: since(self.milestones.alarm_clock_s, from),
+            time_to_name_s: since(self.milestones.name_clock_s, name_from),
+            counted_from: began.map_or(CountedFrom::FirstData, |began| began.by),
             counted_from_clock_s: from,
+            name_counted_from_clock_s: name_from,
             milestones: self.milestones.clone(),
             looks: self.looks.clone(),
         };
@@ -264,8 +264,19 @@ fn came_at_once(known: Option<(usize, f64)>, now: (usize, f64), search_every_s: 
     fresh_s > AT_ONCE * due_s || fresh_s > 2.0 * forward_s
 }
 
-/// Since when what an answer names was there to be found, and what says so.
-fn began(expected: &Expectation, effects: &[EffectAnswer], first_s: f64) -> (CountedFrom, Option<f64>) {
+/// Since when what an answer names was there to be found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Began {
+    /// What says when the first of it began.
+    by: CountedFrom,
+    /// When that was.
+    first_s: f64,
+    /// When the last of it began.
+    last_s: f64,
+}
+
+/// Since when what an answer names was there to be found, the record beginning at `first_s`.
+fn began(expected: &Expectation, effects: &[EffectAnswer], first_s: f64) -> Began {
     let onset = |e: &EffectAnswer| e.parameter("onset_s").map(|at| (CountedFrom::Onset, at));
     let logged = |e: &EffectAnswer| {
         let spans = expected.spans(catalogue::logged_kind(&e.id)?);
@@ -273,12 +284,11 @@ fn began(expected: &Expectation, effects: &[EffectAnswer], first_s: f64) -> (Cou
         starts.reduce(f64::min).map(|at| (CountedFrom::LoggedStart, at))
     };
     let began: Vec<_> = effects.iter().filter_map(|e| onset(e).or_else(|| logged(e))).collect();
+    let last_s = began.iter().map(|(_, at)| *at).fold(first_s, f64::max);
     match began.iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
-        Some((_, at)) if began.len() == effects.len() => {
-            let all_logged = began.iter().all(|(by, _)| *by == CountedFrom::LoggedStart);
-            (if all_logged { CountedFrom::LoggedStart } else { CountedFrom::Onset }, Some(*at))
-        }
-        _ => (CountedFrom::FirstData, Some(first_s)),
+        Some((by, at)) if began.len() == effects.len() => Began { by: *by, first_s: *at, last_s },
+        // One of them was always there.
+        _ => Began { by: CountedFrom::FirstData, first_s, last_s },
     }
 }
 
@@ -322,16 +332,16 @@ mod tests {
         let of = |effects: &[&EffectAnswer], first_s| {
             began(&expected, &effects.iter().copied().cloned().collect::<Vec<_>>(), first_s)
         };
-        assert_eq!(of(&[&dump], 200.0), (CountedFrom::LoggedStart, Some(950.0)), "the first that is recorded");
-        assert_eq!(
-            of(&[&dump], 1000.0),
-            (CountedFrom::LoggedStart, Some(1000.0)),
-            "one under way, from the first window"
-        );
-        assert_eq!(of(&[&leak], 0.0), (CountedFrom::Onset, Some(3000.0)));
-        assert_eq!(of(&[&leak, &dump], 2000.0), (CountedFrom::Onset, Some(3000.0)));
-        assert_eq!(of(&[&dump, &offset], 200.0), (CountedFrom::FirstData, Some(200.0)), "one of them was always there");
-        assert_eq!(of(&[], 200.0), (CountedFrom::FirstData, Some(200.0)));
+        let (logged, onset) = (CountedFrom::LoggedStart, CountedFrom::Onset);
+        let began = |by, first_s, last_s| Began { by, first_s, last_s };
+        assert_eq!(of(&[&dump], 200.0), began(logged, 950.0, 950.0), "the first that is recorded");
+        assert_eq!(of(&[&dump], 1000.0), began(logged, 1000.0, 1000.0), "one under way, from the first window");
+        assert_eq!(of(&[&leak], 0.0), began(onset, 3000.0, 3000.0));
+        assert_eq!(of(&[&leak, &dump], 200.0), began(logged, 950.0, 3000.0), "no such set before the leak");
+        assert_eq!(of(&[&leak, &dump], 2000.0).first_s, 3000.0);
+        let always = CountedFrom::FirstData;
+        assert_eq!(of(&[&dump, &offset], 200.0), began(always, 200.0, 950.0), "one of them was always there");
+        assert_eq!(of(&[], 200.0), began(always, 200.0, 200.0));
     }
 
     #[test]

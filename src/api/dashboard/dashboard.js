@@ -251,9 +251,10 @@ async function refreshDiagnosis() {
   const parts = [`${p.windows_searched.toLocaleString("en")} of ${p.windows_seen.toLocaleString("en")} usable windows looked at`];
   if (p.last_clock_s !== null) parts.push(`as of MET ${clockText(p.last_clock_s - liftoffClockS)}`);
   const since = { onset: "after its onset", logged_start: "after its start in the log" }[p.counted_from] ?? "after the first data";
+  const sinceName = p.name_counted_from_clock_s === p.counted_from_clock_s ? since : "after the last of it began";
   const atOnce = (came) => came ? " (of a playback that came at once)" : "";
   if (p.time_to_detect_s !== null) parts.push(`alarm ${spanText(p.time_to_detect_s)} ${since}${atOnce(p.alarm_came_at_once)}`);
-  if (p.time_to_name_s !== null) parts.push(`named ${spanText(p.time_to_name_s)} ${since}${atOnce(p.name_came_at_once)}`);
+  if (p.time_to_name_s !== null) parts.push(`named ${spanText(p.time_to_name_s)} ${sinceName}${atOnce(p.name_came_at_once)}`);
   if (p.windows_beyond) parts.push(`${p.windows_beyond.toLocaleString("en")} windows are beyond the simulation`);
   if (p.alarms_withdrawn) parts.push(`${p.alarms_withdrawn} alarm(s) withdrawn`);
   if (p.searches_failed) parts.push(`${p.searches_failed} search(es) failed`);

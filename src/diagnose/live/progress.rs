@@ -121,9 +121,9 @@ impl State {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CountedFrom {
-    /// The earliest onset, where every effect named has one: its own or in the log.
+    /// The onset of the earliest effect named, where each has a beginning: its own or in the log.
     Onset,
-    /// The earliest start in the log, where every effect named lasts as long as its entries do.
+    /// The start in the log of the earliest, where each has a beginning.
     LoggedStart,
     /// The first window.
     FirstData,
@@ -158,12 +158,15 @@ pub struct Progress {
     pub at_rest: bool,
     /// Recording seconds from the effect's onset, its logged start or the first data to the last window of the look that raised the alarm.
     pub time_to_detect_s: Option<f64>,
-    /// The same to the look that gave the name that stands.
+    /// To the look that gave the name that stands; of several effects from the beginning of the last, before which there was no such set.
     pub time_to_name_s: Option<f64>,
-    /// What these are counted from.
+    /// What the time to detect is counted from.
     pub counted_from: CountedFrom,
-    /// Instrument clock they are counted from.
+    /// Instrument clock it is counted from.
     pub counted_from_clock_s: Option<f64>,
+    /// Instrument clock that the time to name is counted from.
+    #[serde(default)]
+    pub name_counted_from_clock_s: Option<f64>,
     /// When something was found.
     #[serde(flatten)]
     pub milestones: Milestones,
@@ -211,6 +214,7 @@ impl Report {
             time_to_name_s: None,
             counted_from: CountedFrom::FirstData,
             counted_from_clock_s: None,
+            name_counted_from_clock_s: None,
             milestones: Milestones::default(),
             looks: Vec::new(),
         };
