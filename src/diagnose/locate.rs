@@ -62,7 +62,7 @@ fn direction(scene: &Scene, signal: &Axes) -> (String, Option<[f64; 3]>) {
         let g = scene.grid_s.partition_point(|x| *x < t).min(scene.grid_s.len() - 1);
         rotation(g) * Vec3::new(signal[0][i], signal[1][i], signal[2][i])
     };
-    let mut best = ("body", 0.0, Vec3::zeros());
+    let mut best = (rotations[0], 0.0, Vec3::zeros());
     for (name, rotation) in rotations {
         let mut outer = Mat3::zeros();
         for i in 0..scene.clock_s().len() {
@@ -78,15 +78,14 @@ fn direction(scene: &Scene, signal: &Axes) -> (String, Option<[f64; 3]>) {
         let share = eigen.eigenvalues[top] / trace;
         // Another frame must be clearly steadier than the body's.
         if share > best.1 + 0.02 {
-            best = (name, share, eigen.eigenvectors.column(top).into_owned());
+            best = ((name, rotation), share, eigen.eigenvectors.column(top).into_owned());
         }
     }
     // Of the two ways along the line the one that the largest of it goes.
-    let rotation = rotations.iter().find(|(name, _)| *name == best.0).map(|(_, rotation)| rotation);
-    let along = |i: usize| rotation.map_or(0.0, |rotation| best.2.dot(&turned(rotation, i)));
-    let way: f64 = (0..scene.clock_s().len()).map(|i| along(i).powi(3)).sum();
-    let line = if way < 0.0 { -best.2 } else { best.2 };
-    (best.0.to_string(), (best.1 > 0.9).then(|| [line.x, line.y, line.z]))
+    let ((name, rotation), share, line) = best;
+    let way: f64 = (0..scene.clock_s().len()).map(|i| line.dot(&turned(&rotation, i)).powi(3)).sum();
+    let line = if way < 0.0 { -line } else { line };
+    (name.to_string(), (share > 0.9).then(|| [line.x, line.y, line.z]))
 }
 
 fn lvlh(scene: &Scene, g: usize) -> Mat3 {

@@ -270,7 +270,7 @@ fn principal(errors: &[Vec<f64>]) -> Vec<Vec<f64>> {
     .collect()
 }
 
-/// A bias error that varies less is left out, ng rms: over a day of the quietest windows known, 25 ng of noise, it has an SNR of
+/// An error that all windows share and that varies less is left out, ng rms: over a day of the quietest windows known, 25 ng of noise, it has an SNR of
 /// half a standard deviation.
 pub(super) const NEGLIGIBLE_NG: f64 = 0.25;
 

@@ -16,7 +16,7 @@ const clockText = (s) => { const d = Math.floor(s / 86400), t = new Date((s - d 
 
 let liftoffClockS = 0;         // met_s = clock_s - this
 const windows = new Map();     // window_start_clock_s -> window
-let gaps = [], playbacks = [], newest = null, whole = null, dirty = true;
+let gaps = [], playbacks = [], dirty = true;
 
 // ---- traces -----------------------------------------------------------------------------------------------------
 const AXES = [["x", "X tail to nose"], ["y", "Y to starboard"], ["z", "Z down"]];
@@ -73,6 +73,7 @@ function draw() {
   drawNow();
 }
 
+// ---- the latest value ---------------------------------------------------------------------------------------------
 function drawNothing() {
   for (const axis of ["x", "y", "z"]) {
     byId("a" + axis).textContent = byId("s" + axis).textContent = ng(null);
@@ -83,7 +84,6 @@ function drawNothing() {
   byId("quality").textContent = "";
 }
 
-// ---- the latest value ---------------------------------------------------------------------------------------------
 function drawNow() {
   const latest = latestWindow();
   if (!latest) return drawNothing();
@@ -104,14 +104,17 @@ const later = (a, b) => !a || b.window_start_clock_s >= a.window_start_clock_s ?
 
 // As `/accel`: of the last window with all three axes, or, where it is ten minutes older than the last with any, of that.
 function latestWindow() {
+  let newest = null, whole = null;
+  for (const window of windows.values()) {
+    if (valued(window, "some")) newest = later(newest, window);
+    if (valued(window, "every")) whole = later(whole, window);
+  }
   const isNear = whole && newest.window_start_clock_s - whole.window_start_clock_s <= WHOLE_WITHIN_S;
   return isNear ? whole : newest;
 }
 
 function take(window) {
   windows.set(window.window_start_clock_s, window);
-  if (valued(window, "some")) newest = later(newest, window);
-  if (valued(window, "every")) whole = later(whole, window);
   if (windows.size > POINTS_MAX) windows.delete(windows.keys().next().value);
   liftoffClockS = window.window_start_clock_s - window.met_s;
   dirty = true;
@@ -119,11 +122,7 @@ function take(window) {
 
 // A window that there is no longer: its frames have lost their places to others.
 function drop(gone) {
-  const startS = gone.window_start_clock_s;
-  windows.delete(startS);
-  const last = (quantity) => [...windows.values()].filter((window) => valued(window, quantity)).reduce(later, null);
-  if (newest?.window_start_clock_s === startS) newest = last("some");
-  if (whole?.window_start_clock_s === startS) whole = last("every");
+  windows.delete(gone.window_start_clock_s);
   dirty = true;
 }
 
@@ -268,7 +267,6 @@ let lastSeq = null;
 // Of another service's windows nothing stays.
 function forget() {
   windows.clear();
-  newest = whole = null;
   dirty = true;
 }
 
