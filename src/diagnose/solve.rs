@@ -41,6 +41,10 @@ const ALONG_MAX: usize = 3;
 const MISSED: f64 = 3.0;
 const SEARCHES_MAX: usize = 4;
 
+/// Windows, three days of them, up to which the search and the one as if there were no slow noise go on side by side: each has a bank of its
+/// own, which grows with the square of the record, and a longer record has work enough for all processors in either.
+const SIDE_BY_SIDE_MAX: usize = 10_000;
+
 /// What a search needs beside the scene, made once a case.
 pub struct Library {
     /// Listed entries, then open ones, then those that are rarer and a push for a while, without starting points.
@@ -208,13 +212,16 @@ pub fn solve_unless(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3]
 fn solve_from(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3], stop: Stop) -> Option<Solution> {
     let entries = &library.entries;
     let null = search::weigh_with_own_noise(scene, entries, &Set::default(), &noise_null, 0, 0);
-    let (found, more) = shared_work::both(
-        || {
-            let (pool, singles) = converged(scene, library, &noise_null, stop)?;
-            Some((pool.weigh(scene, entries, OWN_NOISE, stop)?, singles))
-        },
-        || quietly(scene, library, &noise_null, stop),
-    );
+    let at_its_noise = || {
+        let (pool, singles) = converged(scene, library, &noise_null, stop)?;
+        Some((pool.weigh(scene, entries, OWN_NOISE, stop)?, singles))
+    };
+    let as_if_quiet = || quietly(scene, library, &noise_null, stop);
+    let (found, more) = if scene.schedule.len() > SIDE_BY_SIDE_MAX {
+        (at_its_noise(), as_if_quiet())
+    } else {
+        shared_work::both(at_its_noise, as_if_quiet)
+    };
     let ((mut listed, mut open), Alone { singles, strongest }) = found?;
     let (more_listed, more_open) = more?;
     merge(&mut listed, more_listed);

@@ -27,8 +27,13 @@ pub const EFFECT: Effect = Effect {
     why: "A push fixed in the body begins at an instant no log names and dies away exponentially, whatever the attitude does.",
 };
 
-/// Time constants tried first, s, as far as they are in the range; the spacing of the onsets for each is a share of it.
+/// Time constants tried first, s, as far as they are in the range; the spacing of the onsets for each is half of it, within limits.
 const TAUS_S: [f64; 10] = [600.0, 1200.0, 2400.0, 4800.0, 9600.0, 19_200.0, 38_400.0, 76_800.0, 153_600.0, 307_200.0];
+
+/// Closest and widest spacing of the onsets, s.
+const SPACING_S: [f64; 2] = [300.0, 1800.0];
+/// Onsets of slow ones that a record longer than two days has at least; that of none is spaced wider than an eighth of its time constant.
+const ONSETS_MIN: f64 = 96.0;
 
 /// Shortest and longest decay, s: faster is an event, slower is a step.
 const TAU_RANGE_S: [f64; 2] = [300.0, 80_000.0];
@@ -53,8 +58,11 @@ fn of_a_slow_one(scene: &Scene, theta: &Theta) -> Option<String> {
 }
 
 fn grid(scene: &Scene) -> Vec<Theta> {
+    let [start, end] = scene.span_s();
+    let widest_s = |tau: f64| SPACING_S[1].max((0.125 * tau).min((end - start) / ONSETS_MIN));
     let points = |tau: &f64| {
-        onsets(scene, (0.5 * tau).clamp(300.0, 1800.0), 600.0).into_iter().map(|t| [t, tau.ln()]).collect::<Vec<_>>()
+        let spacing_s = (0.5 * tau).clamp(SPACING_S[0], widest_s(*tau));
+        onsets(scene, spacing_s, 600.0).into_iter().map(|t| [t, tau.ln()]).collect::<Vec<_>>()
     };
     let longest_s = longest_s(scene);
     TAUS_S.iter().filter(|tau| **tau < TRIED_FIRST * longest_s).flat_map(points).collect()
