@@ -14,6 +14,8 @@ use utoipa::{IntoParams, ToSchema};
 use super::App;
 use super::problem::Problem;
 use super::query::{Asked, optional_clock};
+use crate::diagnose::answer::Diagnosis;
+use crate::diagnose::live::Progress;
 use crate::hub::wire::{AnomalyWire, EventWire, Gap};
 use crate::pipeline::Station;
 use crate::pipeline::files::{known_json, ledger_json, version_json};
@@ -114,14 +116,20 @@ pub async fn anomalies(State(app): State<Arc<App>>) -> Json<Vec<AnomalyWire>> {
     Json(ask(&app, told).await)
 }
 
+/// The members of `diagnosis.json`, and of a running diagnosis how far it is.
+#[derive(ToSchema)]
+#[schema(as = DiagnosisReport)]
+#[expect(dead_code, reason = "it describes what the desk tells as it is, and what lies in the data directory")]
+struct Told {
+    #[serde(flatten)]
+    answer: Diagnosis,
+    progress: Option<Progress>,
+}
+
 /// What the simulation lacks: the running diagnosis with its progress, or, where none runs, the `diagnosis.json` that lies in the
 /// data directory.
 #[utoipa::path(get, path = "/diagnosis", tag = "diagnosis",
-    responses((status = 200, body = Object, description = "the members of diagnosis.json, verdict and false_alarm_probability null while \
-        there is no answer; of a running diagnosis also `progress`: state (collecting, searching, current, refused, failed), sentence, \
-        windows_seen, windows_beyond, windows_searched, first_clock_s, last_clock_s, revision, calibration, inputs, at_rest, \
-        time_to_detect_s, time_to_name_s, counted_from (onset, logged_start, first_data), counted_from_clock_s, name_counted_from_clock_s, searches, alarm_clock_s, \
-        name_clock_s, name, alarm_came_at_once, name_came_at_once, alarms_withdrawn, searches_failed, looks"),
+    responses((status = 200, body = Told, description = "as diagnosis.json; of a running diagnosis with its progress"),
         (status = 404, description = "there is none"), (status = 500, description = "the file that lies there is no JSON")))]
 pub async fn diagnosis(State(app): State<Arc<App>>) -> Result<Response, Problem> {
     if let Some(report) = app.desk.report(&app.hub) {

@@ -1,20 +1,24 @@
 //! The answer, field by field as `diagnosis.json` has it. Not here: how it is reached, and how it is drawn.
 
 use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 
 /// The least false-alarm probability that is told: nothing is known to hold farther out.
 pub const LEAST_PROBABILITY: f64 = 1e-12;
 
-/// The answer to one case. `NaN` never appears: what is not known is absent or null.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// The answer to one case. `NaN` never appears: what is not known is absent or null. Of a running diagnosis verdict and probability are
+/// null while there is no answer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Diagnosis {
     /// Always `oare.diagnosis/1`.
     pub schema: String,
     /// The case's id.
     pub case: String,
     /// What is claimed.
+    #[schema(value_type = Option<Verdict>)]
     pub verdict: Verdict,
     /// Probability that a record without any mismatch scores as high as this one did.
+    #[schema(value_type = Option<f64>)]
     pub false_alarm_probability: f64,
     /// What says so.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -77,7 +81,7 @@ impl Diagnosis {
 }
 
 /// Where a false-alarm probability comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Source {
     /// Records of noise alone, simulated once.
@@ -106,7 +110,7 @@ impl Source {
 }
 
 /// What is claimed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Nothing is claimed; upper limits say how small each effect must be.
@@ -132,7 +136,7 @@ impl Verdict {
 }
 
 /// Where the mismatch is.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Located {
     /// Axes that carry it.
     pub axes: Vec<String>,
@@ -150,7 +154,7 @@ pub struct Located {
 }
 
 /// A span of time and why it is named.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Interval {
     /// From, instrument clock.
     pub start_s: f64,
@@ -161,7 +165,7 @@ pub struct Interval {
 }
 
 /// A covariate the residual follows.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Covariate {
     /// Its name.
     pub name: String,
@@ -170,7 +174,7 @@ pub struct Covariate {
 }
 
 /// A line of the spectrum.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct OrbitLine {
     /// Frequency.
     pub cycles_per_orbit: f64,
@@ -181,7 +185,7 @@ pub struct OrbitLine {
 }
 
 /// One named effect.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct EffectAnswer {
     /// Catalogue id.
     pub id: String,
@@ -209,7 +213,7 @@ impl EffectAnswer {
 }
 
 /// A number with its standard error.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ParameterAnswer {
     /// Name as in the catalogue.
     pub name: String,
@@ -222,7 +226,7 @@ pub struct ParameterAnswer {
 }
 
 /// Another possible set.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Alternative {
     /// Its ids.
     pub effects: Vec<String>,
@@ -233,7 +237,7 @@ pub struct Alternative {
 }
 
 /// A formula, never a physical name.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Hypothesis {
     /// The formula.
     pub formula: String,
@@ -247,7 +251,7 @@ pub struct Hypothesis {
 }
 
 /// Before and after.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Fit {
     /// RMS of the noise alone, by the fitted noise model.
     pub noise_floor_ng: [f64; 3],
@@ -270,7 +274,7 @@ pub struct Fit {
 }
 
 /// RMS and whitened misfit.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct FitLevel {
     /// Per axis, a constant removed.
     pub rms_ng: [f64; 3],
@@ -279,7 +283,7 @@ pub struct FitLevel {
 }
 
 /// Prediction of data left out of the fit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct HeldOut {
     /// How the data were divided.
     pub scheme: String,
@@ -297,7 +301,7 @@ pub struct HeldOut {
 }
 
 /// A limit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct UpperLimit {
     /// Catalogue id.
     pub id: String,
@@ -306,7 +310,7 @@ pub struct UpperLimit {
 }
 
 /// An observation that would decide.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SeparatingObservation {
     /// attitude, table_flip or log.
     pub kind: String,
@@ -317,7 +321,8 @@ pub struct SeparatingObservation {
 }
 
 /// One satellite's part of an orbit case.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = DiagnosisArc)]
 pub struct Arc {
     /// Satellite.
     pub id: String,

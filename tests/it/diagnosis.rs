@@ -71,6 +71,49 @@ fn with_case_and(config: &mut Config, lines: &str) {
     config.diagnosis = Config::from_toml_in(&text, &config.data_dir).unwrap().diagnosis;
 }
 
+/// The members of an answer that a schema of the service's own description does not name, each with its place.
+fn undescribed(openapi: &Value, schema: &Value, answer: &Value, place: &str) -> Vec<String> {
+    let schemas = with_parts(openapi, schema);
+    let within = |key: &str| schemas.iter().filter_map(|schema| schema.get(key)).collect::<Vec<&Value>>();
+    match answer {
+        Value::Null => Vec::new(),
+        Value::Object(members) => members
+            .iter()
+            .flat_map(|(name, value)| {
+                let place = format!("{place}.{name}");
+                match within("properties").into_iter().find_map(|properties| properties.get(name)) {
+                    Some(schema) => undescribed(openapi, schema, value, &place),
+                    None => vec![place],
+                }
+            })
+            .collect(),
+        Value::Array(values) => match within("items").first() {
+            Some(items) => values.iter().flat_map(|value| undescribed(openapi, items, value, place)).collect(),
+            None => vec![format!("{place}[]")],
+        },
+        Value::String(_) => of_kind(&within("type"), &["string"], answer, place),
+        Value::Bool(_) => of_kind(&within("type"), &["boolean"], answer, place),
+        Value::Number(_) => of_kind(&within("type"), &["number", "integer"], answer, place),
+    }
+}
+
+fn of_kind(types: &[&Value], kinds: &[&str], answer: &Value, place: &str) -> Vec<String> {
+    let is_one = |kind: &Value| kinds.iter().any(|one| kind == one);
+    let is_described =
+        types.iter().any(|kind| is_one(kind) || kind.as_array().is_some_and(|any| any.iter().any(is_one)));
+    if is_described { Vec::new() } else { vec![format!("{place} = {answer}")] }
+}
+
+/// A schema and all that it is made of.
+fn with_parts<'a>(openapi: &'a Value, schema: &'a Value) -> Vec<&'a Value> {
+    let named = schema["$ref"].as_str().map(|name| {
+        let schema = openapi.pointer(name.trim_start_matches('#'));
+        schema.unwrap_or_else(|| panic!("{name} is described nowhere"))
+    });
+    let parts = ["allOf", "oneOf", "anyOf"].into_iter().filter_map(|key| schema[key].as_array()).flatten().chain(named);
+    std::iter::once(schema).chain(parts.flat_map(|part| with_parts(openapi, part))).collect()
+}
+
 impl Running {
     /// Waits until `/diagnosis` satisfies a condition.
     async fn wait_for_diagnosis(&self, what: &str, holds: impl Fn(&Value) -> bool) -> Value {
@@ -122,6 +165,12 @@ async fn a_concealed_leak_is_named_as_the_windows_come_and_everybody_is_told() {
 
     running.send(second).await;
     let named = running.wait_for_diagnosis("a name", |d| d["verdict"] == "explained").await;
+    let openapi = running.get("/openapi.json").await;
+    let schema = &openapi["paths"]["/diagnosis"]["get"]["responses"]["200"]["content"]["application/json"]["schema"];
+    for answer in [&waiting, &named] {
+        let undescribed = undescribed(&openapi, schema, answer, "diagnosis");
+        assert!(undescribed.is_empty(), "{undescribed:?}");
+    }
     assert_eq!(named["effects"][0]["id"], "vent_leak", "{named:#}");
     let onset = named["effects"][0]["parameters"].as_array().unwrap().iter().find(|p| p["name"] == "onset_s").unwrap();
     let (value, sigma) = (onset["value"].as_f64().unwrap(), onset["sigma"].as_f64().unwrap());

@@ -1,6 +1,7 @@
 //! How far the running diagnosis is, and what it tells: the members of `diagnosis.json` and its progress.
 
 use serde::{Deserialize, Serialize, Serializer};
+use utoipa::ToSchema;
 
 use crate::diagnose::answer::{Diagnosis, Located, Verdict};
 use crate::diagnose::case::WINDOWS_MIN;
@@ -10,7 +11,7 @@ use crate::diagnose::recorder::Seen;
 const LOOKS_MAX: usize = 100;
 
 /// What was seen at one look.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Look {
     /// Windows looked at.
     pub windows: usize,
@@ -25,7 +26,7 @@ pub struct Look {
 }
 
 /// When something was found, as far as it stands. Lasts over restarts.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Milestones {
     /// Looks taken; the same windows looked at again are one look.
     pub searches: u64,
@@ -86,8 +87,9 @@ pub(super) struct Found<'a> {
 }
 
 /// Where the running diagnosis is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
+#[schema(as = DiagnosisState)]
 pub enum State {
     /// Too few windows for any answer.
     Collecting,
@@ -118,7 +120,7 @@ impl State {
 }
 
 /// What times are counted from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CountedFrom {
     /// The onset of the earliest effect named, where each has a beginning: its own or in the log.
@@ -130,7 +132,7 @@ pub enum CountedFrom {
 }
 
 /// How far it is.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Progress {
     /// Where it is.
     pub state: State,
