@@ -4,7 +4,8 @@
 //! The tails alone are heavy: a record whose whitened residuals all lie within [`OUT`] is weighed as Gaussian noise is.
 
 use super::noise::{AxisNoise, Loudness, Schedule, Whitener};
-use super::scene::Scene;
+use super::scene::{Axes, Scene};
+use super::search::{self, Set};
 use super::solve::{Library, Solution, Stop, null_noise, solve_unless};
 
 /// Whitened residual beyond which samples are out of the ordinary: of Gaussian noise one record in a hundred has one such window.
@@ -16,6 +17,10 @@ const ROUNDS: usize = 3;
 
 /// Searches and weighs as [`solve_unless`], then looks for bursts in what the best hypothesis leaves, and searches again beside them
 /// until there are no more.
+///
+/// A hypothesis that explains some windows out of the ordinary and leaves as many others may have been made of the former: among many bursts
+/// some come at even distances, or some time after entries of the log. Then all of them are bursts, and what is found beside these is searched
+/// for again with those windows free that it explains.
 pub fn solve_beside_bursts(
     scene: &mut Scene,
     library: &Library,
@@ -23,19 +28,56 @@ pub fn solve_beside_bursts(
     stop: Stop,
 ) -> Option<Solution> {
     let mut solution = solve_unless(scene, library, noise_null, stop)?;
+    if explains_some_of_many(scene, library, &solution) {
+        let free = scene.loudness.clone();
+        let noise = all_taken_for_bursts(scene, library, &solution.null.noise);
+        solution = solve_unless(scene, library, noise, stop)?;
+        if !solution.best().set.members.is_empty() {
+            scene.loudness = free;
+        }
+    }
     for _ in 1..ROUNDS {
         let best = solution.best();
-        let whitened = best.left(scene, &library.entries).whitened;
-        let mut found = false;
-        for k in 0..3 {
-            found |= weigh_less(&mut scene.loudness[k], &whitened[k], &best.noise[k], &scene.schedule);
-        }
-        if !found {
+        let (whitened, noise) = (best.left(scene, &library.entries).whitened, best.noise);
+        if !mark(scene, &whitened, &noise) {
             break;
         }
         solution = solve_unless(scene, library, null_noise(scene, Some(&solution.null.noise)), stop)?;
     }
     Some(solution)
+}
+
+/// Whether the best hypothesis explains windows that are out of the ordinary beside nothing, and leaves at least as many.
+fn explains_some_of_many(scene: &Scene, library: &Library, solution: &Solution) -> bool {
+    let [before, left] = [&solution.null, solution.best()].map(|w| out(&w.left(scene, &library.entries).whitened));
+    let explained = before.iter().filter(|i| !left.contains(i)).count();
+    explained > 0 && left.len() >= explained
+}
+
+/// Windows that are out of the ordinary on any axis.
+fn out(whitened: &Axes) -> Vec<usize> {
+    let windows = 0..whitened[0].len();
+    windows.filter(|i| whitened.iter().any(|axis| axis[*i].abs() > OUT)).collect()
+}
+
+/// Gives every window that is out of the ordinary beside nothing its burst; the noise beside them.
+fn all_taken_for_bursts(scene: &mut Scene, library: &Library, noise_null: &[AxisNoise; 3]) -> [AxisNoise; 3] {
+    let mut noise = *noise_null;
+    for _ in 0..ROUNDS {
+        let null = search::weigh_with_own_noise(scene, &library.entries, &Set::default(), &noise, 0, 0);
+        let whitened = null.left(scene, &library.entries).whitened;
+        if !mark(scene, &whitened, &noise) {
+            break;
+        }
+        noise = null_noise(scene, Some(&noise));
+    }
+    noise
+}
+
+/// Gives the windows of all axes their bursts; whether there are any new ones.
+fn mark(scene: &mut Scene, whitened: &Axes, noise: &[AxisNoise; 3]) -> bool {
+    let marked = |k: usize| weigh_less(&mut scene.loudness[k], &whitened[k], &noise[k], &scene.schedule);
+    (0..3).map(marked).fold(false, |any, marked| any | marked)
 }
 
 /// Gives windows their bursts where the whitened residual is out of the ordinary; whether there are any new ones.

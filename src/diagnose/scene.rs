@@ -381,23 +381,27 @@ fn period_s(r: &Vec3, v: &Vec3) -> f64 {
     std::f64::consts::TAU * (axis.powi(3) / physics::MU_M3_S2).sqrt()
 }
 
-/// Rates of change: by the four points about each where they are evenly spaced, elsewhere central differences, one-sided at the ends.
+/// Rates of change: by the six points about each where they are evenly spaced, or the four, elsewhere central differences, one-sided at the
+/// ends.
 fn gradient(grid: &[f64], values: &[Vec3]) -> Vec<Vec3> {
     let last = grid.len() - 1;
     let is_even = |around: &[f64]| {
-        let step = 0.25 * (around[4] - around[0]);
+        let step = (around[around.len() - 1] - around[0]) / (around.len() - 1) as f64;
         around.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() < 1e-3 * step)
     };
-    (0..grid.len())
-        .map(|i| {
-            if i > 1 && i + 2 <= last && is_even(&grid[i - 2..i + 3]) {
-                let [near, far] = [1, 2].map(|n| values[i + n] - values[i - n]);
-                return (near * 8.0 - far) / (3.0 * (grid[i + 2] - grid[i - 2]));
-            }
-            let [a, b] = [i.saturating_sub(1), (i + 1).min(last)];
-            (values[b] - values[a]) / (grid[b] - grid[a])
-        })
-        .collect()
+    let by = |i: usize, weights: &[f64]| {
+        let reach = weights.len();
+        let is_inside = i >= reach && i + reach <= last && is_even(&grid[i - reach..=i + reach]);
+        let sum = || weights.iter().zip(1..).map(|(weight, n)| (values[i + n] - values[i - n]) * *weight).sum::<Vec3>();
+        is_inside.then(|| sum() * (2 * reach) as f64 / (grid[i + reach] - grid[i - reach]))
+    };
+    let central = |i: usize| {
+        let [a, b] = [i.saturating_sub(1), (i + 1).min(last)];
+        (values[b] - values[a]) / (grid[b] - grid[a])
+    };
+    let six = [3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0];
+    let four = [2.0 / 3.0, -1.0 / 12.0];
+    (0..grid.len()).map(|i| by(i, &six).or_else(|| by(i, &four)).unwrap_or_else(|| central(i))).collect()
 }
 
 fn interpolate(grid: &[f64], values: &[f64], at: &[f64]) -> Vec<f64> {

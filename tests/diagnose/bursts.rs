@@ -3,6 +3,7 @@
 use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::{Diagnosis, Settings, diagnose};
+use rand::{RngExt, SeedableRng};
 
 fn answer(kind: Kind, only: Option<&'static str>, manner: Manner) -> Diagnosis {
     let concealed = draw_order(&Order { kind, seed: 41, only, manner });
@@ -29,5 +30,28 @@ fn bursts_are_no_finding_and_hide_none() {
     for (a, b) in even.effects[0].parameters.iter().zip(&loud.effects[0].parameters) {
         assert!(b.sigma < 1.2 * a.sigma, "{}: {} and {}", a.name, a.sigma, b.sigma);
         assert!((a.value - b.value).abs() < 4.0 * a.sigma.hypot(b.sigma), "{}: {} and {}", a.name, a.value, b.value);
+    }
+}
+
+/// One window in a hundred off by five to forty standard deviations, alone, as no burst of samples is. Of so many some come at even distances
+/// or some time after what is logged.
+#[test]
+fn spikes_at_chance_instants_are_no_finding() {
+    for seed in 0..5 {
+        let concealed =
+            draw_order(&Order { kind: Kind::Clean, seed: 900 + seed, only: None, manner: Manner::default() });
+        let mut case = super::case(&concealed.files);
+        let mut rng = rand_chacha::ChaCha12Rng::seed_from_u64(seed);
+        for axis in &mut case.recording.a_ng {
+            let mut steps: Vec<f64> = axis.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+            steps.sort_by(f64::total_cmp);
+            let deviation_ng = 1.5 * steps[steps.len() / 2];
+            for x in axis.iter_mut().filter(|_| rng.random::<f64>() < 0.01) {
+                let size = 5.0 * 8.0_f64.powf(rng.random::<f64>()) * deviation_ng;
+                *x += if rng.random::<bool>() { size } else { -size };
+            }
+        }
+        let found = diagnose(&case, &Settings::default()).unwrap();
+        assert_eq!(found.verdict, Verdict::Consistent, "{seed}: {found:?}");
     }
 }

@@ -31,7 +31,7 @@ pub const LAWS: [(&str, &str); 16] = [
 ];
 
 /// Laws that are there by name only: what is drawn stays what it was.
-const LAWS_BY_NAME: [(&str, &str); 7] = [
+const LAWS_BY_NAME: [(&str, &str); 8] = [
     ("unknown_ringing", "a damped oscillation after every change of attitude"),
     ("unknown_packet", "an oscillation that swells and fades once"),
     ("unknown_slow_chirp", "a slow oscillation of drifting period"),
@@ -39,6 +39,7 @@ const LAWS_BY_NAME: [(&str, &str); 7] = [
     ("unknown_clock", "a ramp that starts again at even distances of its own"),
     ("unknown_push", "one push that ends"),
     ("unknown_slack", "the temperature, followed with a slack"),
+    ("unknown_spot", "a push over one spot of the Earth"),
 ];
 
 /// Name and plain statement of every law.
@@ -89,6 +90,7 @@ pub fn signature(rng: &mut ChaCha12Rng, name: &str, flight: &Flight, total: &[Ve
             let (longitude, width) = (between(rng, -180.0, 180.0), between(rng, 25.0, 45.0));
             along((0..n).map(|k| region(flight, k, longitude, width)).collect(), fixed)
         }
+        "unknown_spot" => along(spot(rng, flight), fixed),
         "unknown_rectified_rate" => {
             along(flight.rate_change_rad_s2.iter().map(|w| (w[axis].abs() * 1e7).min(30.0)).collect(), fixed)
         }
@@ -142,9 +144,28 @@ fn bump(hour: f64, centre: f64, width: f64) -> f64 {
     (-0.5 * (away / width).powi(2)).exp()
 }
 
+/// Longitude below the vehicle from that of some meridian, deg.
+fn longitude_deg(flight: &Flight, k: usize) -> f64 {
+    let r = flight.position_m[k];
+    (r.y.atan2(r.x) - super::flight::EARTH_RATE_RAD_S * (flight.times_s[k] - flight.start_s)).to_degrees()
+}
+
+/// Within some ten or twenty degrees of a point of the ground track.
+fn spot(rng: &mut ChaCha12Rng, flight: &Flight) -> Vec<f64> {
+    let (at, radius_deg) = (between(rng, 0.0, flight.times_s.len() as f64) as usize, between(rng, 10.0, 25.0));
+    let below = |k: usize| {
+        let r = flight.position_m[k].normalize();
+        let (sin, cos) = longitude_deg(flight, k).to_radians().sin_cos();
+        let out = r.x.hypot(r.y);
+        Vector3::new(out * cos, out * sin, r.z)
+    };
+    let (centre, least) = (below(at), radius_deg.to_radians().cos());
+    (0..flight.times_s.len()).map(|k| f64::from(u8::from(below(k).dot(&centre) > least))).collect()
+}
+
 fn region(flight: &Flight, k: usize, longitude_deg: f64, width_deg: f64) -> f64 {
     let r = flight.position_m[k];
-    let turned = (r.y.atan2(r.x) - super::flight::EARTH_RATE_RAD_S * (flight.times_s[k] - flight.start_s)).to_degrees();
+    let turned = self::longitude_deg(flight, k);
     let away = (turned - longitude_deg + 540.0).rem_euclid(360.0) - 180.0;
     f64::from(u8::from(away.abs() < width_deg && r.z < 0.0))
 }

@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 pub use fitted_law::FittedLaw;
 pub use header::{Files, Header, KEYS, NEEDED, Vehicle};
+pub use motion::unresolved;
 pub use spikes::SPIKE;
 
 use super::error::CaseError;

@@ -6,6 +6,7 @@ use nalgebra::{Quaternion, UnitQuaternion};
 
 use super::Ancillary;
 use crate::diagnose::error::CaseError;
+use crate::math::rms::about_mean;
 use crate::math::robust::median;
 use crate::physics::Vec3;
 
@@ -18,6 +19,9 @@ const VELOCITY_SHARE: f64 = 0.2;
 const RATE_SHARE: f64 = 0.5;
 /// Rates below say nothing, rad/s: a deadband may swing within a step.
 const RATE_LEAST_RAD_S: f64 = 2e-4;
+
+/// A swing of the rates that is less is rounding, rad/s.
+const SWING_LEAST_RAD_S: f64 = 1e-7;
 
 /// A quantity and the rate of change it should be.
 struct Pair {
@@ -60,6 +64,20 @@ pub fn agree(file: &str, ancillary: &Ancillary) -> Result<(), CaseError> {
     middle(file, rates, RATE_SHARE, &turning.collect::<Vec<Pair>>())
 }
 
+/// Share of the swing of the body rates that is missed between the rows of the ancillary data, of the middle row: slews are as they are.
+pub fn unresolved(ancillary: &Ancillary) -> f64 {
+    let rates: [Vec<f64>; 3] = std::array::from_fn(|k| ancillary.w_rad_s.iter().map(|w| w[k]).collect());
+    let about = rates.each_ref().map(|rates| about_mean(rates));
+    let norm = |of: &dyn Fn(usize) -> f64| (0..3).map(|k| of(k).powi(2)).sum::<f64>().sqrt();
+    let rows = || 0..ancillary.clock_s.len();
+    let mut missed: Vec<f64> = rows().map(|i| norm(&|k| super::missed(&ancillary.clock_s, &rates[k], i))).collect();
+    let mut swing: Vec<f64> = rows().map(|i| norm(&|k| about[k][i])).collect();
+    match [&mut missed, &mut swing].map(|all| median(all).unwrap_or(0.0)) {
+        [missed, swing] if swing > SWING_LEAST_RAD_S => missed / swing,
+        _ => 0.0,
+    }
+}
+
 fn middle(
     file: &str,
     (column, other, unit): (&str, &'static str, &'static str),
@@ -76,4 +94,21 @@ fn middle(
         return Err(CaseError::Contradiction { file, column, other, unit, found, expected, apart });
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rates that swing once in 300 s: every minute a row is too few, every 20 s are enough.
+    #[test]
+    fn rows_that_are_too_few_for_the_motion_are_told() {
+        let of = |step_s: f64| {
+            let clock_s: Vec<f64> = (0..400).map(|i| step_s * f64::from(i)).collect();
+            let swing = |t: &f64| 1e-4 * (std::f64::consts::TAU * t / 300.0).sin();
+            let w_rad_s = clock_s.iter().map(|t| [1.1e-3 + swing(t), 0.0, 2e-4]).collect();
+            unresolved(&Ancillary { clock_s, w_rad_s, ..Ancillary::default() })
+        };
+        assert!((0.05..0.2).contains(&of(60.0)) && of(20.0) < 0.005, "{} {}", of(60.0), of(20.0));
+    }
 }

@@ -17,6 +17,7 @@ use thiserror::Error;
 pub use answer::Answer;
 pub use plates::Plates;
 
+use crate::diagnose::case::KEYS;
 use crate::diagnose::keys::{self, lookup, texts};
 use crate::diagnose::orbit::{self, OrbitError};
 
@@ -145,6 +146,18 @@ impl MeasuredCase {
         }
     }
 
+    /// The dotted keys that cases of its kind do not have, and that nothing reads: one that is mistyped is among them.
+    fn unknown_keys(&self) -> Vec<String> {
+        let of_its_kind: &[&str] = match self.kind {
+            Kind::OrbitSp3 => &["files", "eop", "gravity", "satellites", "position_sigma_m", "fit_hours"],
+            Kind::SeriesCsv => &["time.column", "time.format", "values", "controls", "covariates", "spans_h"],
+            Kind::StaticPoses => &["columns", "gravity_m_s2", "zero_counts"],
+        };
+        let of_recording = of_its_kind.iter().map(|key| format!("recording.{key}"));
+        let known: Vec<String> = KEYS.iter().map(|key| (*key).to_owned()).chain(of_recording).collect();
+        keys::unknown(&self.table, &known.iter().map(String::as_str).collect::<Vec<&str>>())
+    }
+
     /// A number, if the key is there.
     pub fn number(&self, key: &str) -> Result<Option<f64>, MeasuredError> {
         let Some(value) = lookup(&self.table, key) else { return Ok(None) };
@@ -177,11 +190,14 @@ pub fn analyse(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<
             return Err(MeasuredError::MissingFile { file: name });
         }
     }
-    match case.kind {
+    let (mut answer, plates) = match case.kind {
         Kind::OrbitSp3 => orbit::diagnose(case, files),
         Kind::SeriesCsv => crate::diagnose::series::diagnose(case, files),
         Kind::StaticPoses => crate::diagnose::poses::diagnose(case, files),
-    }
+    }?;
+    let told = |key: String| format!("case.toml: `{key}` is no key of a case of this kind, and is not read");
+    answer.notes.splice(0..0, case.unknown_keys().into_iter().map(told));
+    Ok((answer, plates))
 }
 
 fn kind(table: &toml::Table) -> Option<Kind> {
@@ -202,6 +218,13 @@ mod tests {
         let text = "[case]\nid = \"a\"\n[recording]\nkind = \"orbit_sp3\"\nfit_hours = 48.0\n";
         let case = MeasuredCase::parse(text, &["recording.fit_hours=24".to_owned()]).unwrap();
         assert_eq!(case.number("recording.fit_hours").unwrap(), Some(24.0));
+    }
+
+    #[test]
+    fn a_key_that_nothing_reads_is_found() {
+        let text = "[case]\nid = \"a\"\n[recording]\nkind = \"series_csv\"\nposition_sigma = 1.0\ntime = { column = \"t\", unit = \"h\" }\n";
+        let case = MeasuredCase::parse(text, &[]).unwrap();
+        assert_eq!(case.unknown_keys(), ["recording.position_sigma", "recording.time.unit"]);
     }
 
     #[test]

@@ -5,6 +5,7 @@
 use std::fmt::Write;
 
 use super::answer::{ArcAnswer, Effect};
+use super::spread::median;
 use super::{Answer, Plates, figures};
 use crate::diagnose::answer::{ParameterAnswer, Verdict};
 use crate::diagnose::report::page::{open_diagnosis, probability};
@@ -70,29 +71,49 @@ pub fn section(out: &mut String, answer: &Answer, plates: &Plates, heading: &str
 
 /// What is missing, and what is left, in a sentence or two.
 pub fn sentence(answer: &Answer) -> String {
-    let odd: Vec<&str> =
-        answer.arcs.iter().filter(|a| a.verdict == Verdict::Unexplained).map(|a| a.id.as_str()).collect();
-    let (was, is) = (answer.fit.before.rms_total, answer.fit.after.rms_total);
-    let names: Vec<String> = answer.effects.iter().map(|e| lower_first(&e.name)).collect();
+    let odd: Vec<&ArcAnswer> = answer.arcs.iter().filter(|a| a.verdict == Verdict::Unexplained).collect();
+    let unit = &answer.unit;
+    let mut names: Vec<String> = Vec::new();
+    for name in answer.effects.iter().map(|e| lower_first(&e.name)) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
     let mut text = match (names.as_slice(), answer.verdict) {
-        ([], Verdict::Unexplained) => format!(
-            "Recording and simulation differ by {} {}, and nothing in the catalogue explains it.",
-            number(was),
-            answer.unit
+        ([], Verdict::Unexplained) => {
+            let most = odd.iter().map(|arc| arc.rms_after).fold(answer.fit.before.rms_total, f64::max);
+            format!(
+                "Recording and simulation differ by {} {unit}, and nothing in the catalogue explains it.",
+                number(most)
+            )
+        }
+        ([], _) => format!(
+            "The simulation lacks nothing that shows: what is left, {} {unit} rms, follows nothing that was asked.",
+            number(answer.fit.after.rms_total)
         ),
-        ([], _) => format!("The simulation lacks nothing that {} {} would show.", number(is), answer.unit),
-        _ => format!(
-            "The simulation lacks {}: with it the residual falls from {} to {} {}.",
-            listed(&names),
-            number(was),
-            number(is),
-            answer.unit
-        ),
+        _ => format!("The simulation lacks {}: {}.", listed(&names), falls(answer)),
     };
     if !odd.is_empty() && odd.len() < answer.arcs.len() {
-        let _ = write!(text, " {} stays unexplained, and is given no cause.", odd.join(", "));
+        let ids: Vec<&str> = odd.iter().map(|arc| arc.id.as_str()).collect();
+        let (stay, are) = if ids.len() == 1 { ("stays", "is") } else { ("stay", "are") };
+        let _ = write!(text, " {} {stay} unexplained, and {are} given no cause.", ids.join(", "));
     }
     text
+}
+
+/// By how much the residual falls with all that is named: of all, or of those alone that have any of it where others have none.
+fn falls(answer: &Answer) -> String {
+    let with: Vec<&ArcAnswer> = answer.arcs.iter().filter(|arc| !arc.effects.is_empty()).collect();
+    let (was, is, whose) = if with.is_empty() || with.len() == answer.arcs.len() {
+        (answer.fit.before.rms_total, answer.fit.after.rms_total, String::new())
+    } else {
+        let [was, is] = [|arc: &ArcAnswer| arc.rms_before, |arc: &ArcAnswer| arc.rms_after]
+            .map(|of| median(with.iter().map(|arc| of(arc))));
+        let ids: Vec<String> = with.iter().map(|arc| arc.id.clone()).collect();
+        let whose = if ids.len() <= 4 { listed(&ids) } else { format!("{} of {}", ids.len(), answer.arcs.len()) };
+        (was, is, format!(" of {whose}"))
+    };
+    format!("with it the residual{whose} falls from {} to {} {}", number(was), number(is), answer.unit)
 }
 
 fn listed(names: &[String]) -> String {
@@ -161,7 +182,9 @@ fn predicts(out: &mut String, answer: &Answer) {
     };
     let list = |v: &[f64]| v.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", ");
     let log_score = match (held.log_score_gain, held.log_score_gain_se) {
-        (Some(gain), Some(error)) => format!("; the log score rises by {} ± {}", number(gain), number(error)),
+        (Some(gain), Some(error)) if gain != 0.0 || error != 0.0 => {
+            format!("; the log score rises by {} ± {}", number(gain), number(error))
+        }
         _ => String::new(),
     };
     let _ = writeln!(
@@ -181,7 +204,14 @@ fn arcs(out: &mut String, answer: &Answer) {
         let coefficients = |effects: &[Effect]| {
             // A figure stays with its error and unit on one line.
             let figure = |p: &ParameterAnswer| with_error(p).replace(' ', "\u{a0}");
-            let one = |effect: &Effect| effect.parameters.first().map(figure).unwrap_or_default();
+            // Of many satellites the first coefficient of each effect says enough, and the size of a velocity step: all are in diagnosis.json.
+            let first = |effect: &Effect| effect.parameters.iter().position(|p| p.name == "dv_m_s").unwrap_or(0);
+            let few =
+                |effect: &Effect| if many { first(effect)..first(effect) + 1 } else { 0..effect.parameters.len() };
+            let one = |effect: &Effect| {
+                let told = effect.parameters.get(few(effect)).unwrap_or_default();
+                told.iter().map(|p| format!("{}\u{a0}{}", p.name, figure(p))).collect::<Vec<_>>().join(", ")
+            };
             effects.iter().map(one).collect::<Vec<_>>().join("; ")
         };
         vec![
@@ -190,7 +220,6 @@ fn arcs(out: &mut String, answer: &Answer) {
             number(arc.rms_before),
             number(arc.rms_after),
             arc.predicted_rms.map_or("-".to_owned(), number),
-            // Of many satellites the first coefficient of each effect says enough: all are in diagnosis.json.
             if many { coefficients(&arc.effects[..arc.effects.len().min(2)]) } else { coefficients(&arc.effects) },
             left(arc),
         ]

@@ -1,6 +1,7 @@
-//! Forms that live in one place: within a bump or beyond a threshold of any covariate, and over one region of the Earth.
+//! Forms that live in one place: within a bump or beyond a threshold of any covariate, and over one region or spot of the Earth.
 
 use super::{AXIS, Collector};
+use crate::physics::Vec3;
 
 /// Centres of the bumps round a circle.
 const CENTRES: usize = 16;
@@ -12,6 +13,7 @@ const QUANTILES: [f64; 9] = [0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95];
 pub(super) fn places(c: &mut Collector) {
     circles(c);
     regions(c);
+    spots(c);
     thresholds(c);
 }
 
@@ -63,6 +65,48 @@ fn regions(c: &mut Collector) {
         }
     }
     c.family("longitude", "over one region of the Earth", members);
+}
+
+/// Radii of the spots, deg: what sees a ground station, and what is as wide as an anomaly of the field.
+const RADII_DEG: [f64; 2] = [15.0, 25.0];
+/// Spacing of their centres, deg.
+const SPACING_DEG: i32 = 20;
+
+/// A push over one spot of the Earth, such as a transmitter makes that is switched on there.
+fn spots(c: &mut Collector) {
+    let s = c.scene;
+    let below: Vec<Vec3> = s
+        .longitude_rad()
+        .iter()
+        .zip(&s.r_m)
+        .map(|(longitude, r)| {
+            let (sin, cos) = longitude.sin_cos();
+            let up = r.z / r.norm();
+            let out = (1.0 - up * up).max(0.0).sqrt();
+            Vec3::new(out * cos, out * sin, up)
+        })
+        .collect();
+    let farthest_deg = below.iter().map(|r| r.z.abs()).fold(0.0, f64::max).asin().to_degrees();
+    let rows = (farthest_deg / f64::from(SPACING_DEG)).round() as i32;
+    let mut members = Vec::new();
+    for radius_deg in RADII_DEG {
+        for latitude_deg in (-rows..=rows).map(|row| row * SPACING_DEG) {
+            // As many round a circle of latitude as keep their distance.
+            let around = (360.0 / f64::from(SPACING_DEG) * f64::from(latitude_deg).to_radians().cos()).round() as i32;
+            for longitude_deg in (0..around).map(|i| 360.0 * f64::from(i) / f64::from(around)) {
+                let (sin, cos) = f64::from(latitude_deg).to_radians().sin_cos();
+                let (east, ahead) = longitude_deg.to_radians().sin_cos();
+                let centre = Vec3::new(cos * ahead, cos * east, sin);
+                let least = radius_deg.to_radians().cos();
+                let inside = |g: usize| f64::from(u8::from(below[g].dot(&centre) > least));
+                let formula = format!(
+                    "within {radius_deg:.0} deg of latitude {latitude_deg} deg, longitude {longitude_deg:.0} deg"
+                );
+                members.push((formula, s.measure_scalar(inside)));
+            }
+        }
+    }
+    c.family("longitude", "over one spot of the Earth", members);
 }
 
 /// Beyond a threshold of one covariate: a gate, and a ramp that starts there.

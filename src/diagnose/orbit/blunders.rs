@@ -5,12 +5,17 @@ use nalgebra::Vector3;
 
 use super::finer::fullest;
 use super::search::Problem;
+use crate::diagnose::measured::spread::median;
 use crate::physics::earth_orientation::lagrange_weights;
 
 /// Standard errors of a position that a blunder is off the polynomial through its neighbours.
 const TIMES: f64 = 12.0;
 /// Neighbours on either side.
 const SIDE: usize = 4;
+/// Usual steps within which a position is a neighbour.
+const NEAR_STEPS: f64 = 5.5;
+/// Error of what an epoch is off the polynomial through four even neighbours on either side, over that of a position.
+const IN_THE_MIDDLE: f64 = 1.63;
 
 /// Leaves blunders out of all arcs, and counts them as masked.
 pub fn leave_out(problem: &mut Problem) {
@@ -25,30 +30,34 @@ pub fn leave_out(problem: &mut Problem) {
     }
 }
 
-/// Epochs of what is left of an arc that are off by more than so much, each alone.
+/// Epochs of what is left of an arc that are off by more than so much, each alone: without it nothing about it is. A step of velocity is a
+/// bend, and what is beside it is off without it as well.
 fn found(t_s: &[f64], left: &[Vector3<f64>], least_m: f64) -> Vec<usize> {
-    let miss = |i: usize, without: Option<usize>| miss(t_s, left, i, without);
-    let misses: Vec<f64> = (0..left.len()).map(|i| miss(i, None).unwrap_or(0.0)).collect();
+    let usual_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]));
+    let miss = |i: usize, without: Option<usize>| miss(t_s, left, (i, without), usual_s).unwrap_or(0.0);
     let around = |i: usize| (i.saturating_sub(SIDE)..(i + SIDE + 1).min(left.len())).filter(move |j| *j != i);
-    let is_worst = |i: usize| misses[i] > least_m && around(i).all(|j| misses[j] <= misses[i]);
-    // A step of velocity is a bend: its neighbours contradict each other without it as well.
-    let is_alone = |i: usize| around(i).all(|j| miss(j, Some(i)).is_none_or(|miss_m| miss_m <= least_m));
-    (0..left.len()).filter(|i| is_worst(*i) && is_alone(*i)).collect()
+    let is_alone = |i: &usize| miss(*i, None) > least_m && around(*i).all(|j| miss(j, Some(*i)) <= least_m);
+    let alone: Vec<usize> = (0..left.len()).filter(is_alone).collect();
+    // Near an end one without its neighbour may be told by too little.
+    let is_worst = |i: &usize| around(*i).all(|j| !alone.contains(&j) || miss(j, None) <= miss(*i, None));
+    alone.iter().copied().filter(is_worst).collect()
 }
 
-/// What an epoch is off the polynomial through its neighbours, m; none near an end.
-fn miss(t_s: &[f64], left_m: &[Vector3<f64>], i: usize, without: Option<usize>) -> Option<f64> {
-    let other = |j: &usize| Some(*j) != without;
-    let before: Vec<usize> = (0..i).rev().filter(other).take(SIDE).collect();
-    let after: Vec<usize> = (i + 1..left_m.len()).filter(other).take(SIDE).collect();
-    if before.len() < SIDE || after.len() < SIDE {
+/// What an epoch is off the polynomial through its neighbours, m: by as much less as the polynomial is worse known than in the middle of all of
+/// them, near an end or a hole. None where there are too few.
+fn miss(t_s: &[f64], left_m: &[Vector3<f64>], (i, without): (usize, Option<usize>), usual_s: f64) -> Option<f64> {
+    let is_near = |j: &usize| Some(*j) != without && (t_s[*j] - t_s[i]).abs() < NEAR_STEPS * usual_s;
+    let before: Vec<usize> = (0..i).rev().take(SIDE + 1).filter(is_near).take(SIDE).collect();
+    let after: Vec<usize> = (i + 1..left_m.len()).take(SIDE + 1).filter(is_near).take(SIDE).collect();
+    if before.len().max(after.len()) < SIDE {
         return None;
     }
     let around = [before, after].concat();
     let nodes: Vec<f64> = around.iter().map(|j| t_s[*j] - t_s[i]).collect();
     let weights = lagrange_weights(&nodes, 0.0);
     let through: Vector3<f64> = around.iter().zip(&weights).map(|(j, w)| left_m[*j] * *w).sum();
-    Some((through - left_m[i]).norm())
+    let error = (1.0 + weights.iter().map(|w| w * w).sum::<f64>()).sqrt();
+    Some((through - left_m[i]).norm() * (IN_THE_MIDDLE / error).min(1.0))
 }
 
 #[cfg(test)]
@@ -63,9 +72,22 @@ mod tests {
         let off = |at: usize, m: f64| -> Vec<Vector3<f64>> {
             t_s.iter().enumerate().map(|(i, t)| smooth(*t) + Vector3::x() * if i == at { m } else { 0.0 }).collect()
         };
+        let in_a_hole = |mut left: Vec<Vector3<f64>>| {
+            let mut t_s = t_s.clone();
+            (t_s.drain(50..60), left.drain(50..60));
+            super::found(&t_s, &left, 0.3)
+        };
+        assert!(in_a_hole(off(40, 0.0)).is_empty());
+        for at in [46, 49, 60, 62] {
+            assert_eq!(in_a_hole(off(at, 3.0)), [if at < 50 { at } else { at - 10 }]);
+        }
         let found = |left: Vec<Vector3<f64>>| found(&t_s, &left, 0.3);
         assert!(found(off(40, 0.0)).is_empty());
         assert_eq!(found(off(40, 0.8)), [40]);
+        // At the ends less is known of where it should be.
+        for at in [0, 1, 2, 3, 4, 91, 92, 93, 94, 95] {
+            assert_eq!(found(off(at, 3.0)), [at]);
+        }
         let bent = t_s.iter().map(|t| smooth(*t) + Vector3::y() * 2e-3 * (t - 36_300.0).max(0.0)).collect();
         assert!(found(bent).is_empty());
     }

@@ -1,7 +1,7 @@
 //! A velocity step of one satellite: looked for at every epoch by the columns it would have, then fitted with its instant.
 //!
 //! It belongs to one arc and is no common cause. It is claimed only where it leaves what the stated accuracy allows, and is
-//! larger than what an unlisted push gains over the arc: four free numbers take something off any odd arc. Not here: terms that push all the time (`search`).
+//! larger than what an unlisted push gains over the arc, or leaves nothing else: four free numbers take something off any odd arc. Not here: terms that push all the time (`search`).
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 
@@ -17,6 +17,9 @@ const PROVISIONAL: f64 = 0.1;
 pub(super) const LEFT_MAX: f64 = 0.2;
 /// A step is told from an unlisted push that lasts when it is this many times what such a push gains over the arc.
 const UNLISTED_TIMES: f64 = 10.0;
+/// One that is smaller must leave the stated accuracy, but for this factor, and less than this part of the rms.
+const CLEAN: f64 = 1.5;
+const CLEAN_LEFT: f64 = 0.05;
 /// Unknowns of a velocity step.
 const UNKNOWNS: f64 = 4.0;
 
@@ -53,7 +56,9 @@ pub fn step(problem: &Problem, level: &Level, rivals: &[f64]) -> Option<Level> {
         let Some(tried) = fitted(problem, level, i) else { continue };
         let is = tried.rms_m(0..arc.fitted);
         let small = tried.impulse.is_none_or(|impulse| impulse.dv_m_s.norm() < least_m_s(arc));
-        if small || is > LEFT_MAX * was {
+        // What leaves nothing but the stated error of so much more is no push that lasts, however small.
+        let clean = is <= CLEAN * 3f64.sqrt() * problem.sigma_m && is < CLEAN_LEFT * was;
+        if (small && !clean) || is > LEFT_MAX * was {
             continue;
         }
         let enough = is <= problem.rms_max_m() || (is < PROVISIONAL * was && is < PROVISIONAL * rivals[i]);
@@ -114,7 +119,7 @@ fn fitted(problem: &Problem, level: &Level, i: usize) -> Option<ArcFit> {
     });
     let (k, step, left) = tried.min_by(|a, b| a.2.total_cmp(&b.2))?;
     // Linear columns see an orbit that is still bent to the step: only what is far from enough is turned away here.
-    if left > 0.25 * y.norm_squared() || step.norm() < 0.3 * least_m_s(arc) {
+    if left > 0.25 * y.norm_squared() {
         return None;
     }
     let mut from = fit.clone();

@@ -381,9 +381,12 @@ fn limits(problem: &Problem, search: &Search, last: &Level) -> Vec<Limit> {
     search.refused.iter().map(one).collect()
 }
 
+/// What would have been the first term in place of the one that was.
 fn alternatives(search: &Search, table: &Table) -> Vec<Alternative> {
-    let Some((named, best, _)) = table.first() else { return Vec::new() };
-    let others = search.first_scores.iter().filter(|(term, score)| term != named && *score > 0.0);
+    let is_named = |term: &Term| table.iter().any(|(named, ..)| named == term);
+    let of_named = search.first_scores.iter().filter(|(term, _)| is_named(term)).map(|(_, score)| *score);
+    let Some(best) = of_named.reduce(f64::max) else { return Vec::new() };
+    let others = search.first_scores.iter().filter(|(term, score)| !is_named(term) && *score > 0.0 && *score <= best);
     let one = |(term, score): &(Term, f64)| Alternative {
         effects: vec![term.id().to_owned()],
         posterior: posterior(score - best),
@@ -460,7 +463,12 @@ fn notes(problem: &Problem, arcs: &[ArcAnswer], search: &Search) -> Vec<String> 
     ];
     let masked: usize = problem.arcs.iter().map(|arc| arc.masked).sum();
     if masked > 0 {
-        notes.push(format!("{masked} positions are left out: they are missing, cannot be read, or are off the orbit through the others."));
+        let are = if masked == 1 {
+            "position is left out: it is missing, cannot be read, or is"
+        } else {
+            "positions are left out: they are missing, cannot be read, or are"
+        };
+        notes.push(format!("{masked} {are} off the orbit through the others."));
     }
     if !problem.left_out.is_empty() {
         notes.push(format!("Left out: {}.", problem.left_out.join("; ")));

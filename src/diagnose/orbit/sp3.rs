@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::OrbitError;
+use crate::diagnose::measured::spread::median;
 use crate::physics::earth_orientation::{GpsInstant, TAI_MINUS_GPS_S, lagrange_weights, tai_minus_utc_s};
 
 /// A position further than this from the polynomial through its neighbours is a blunder, m, where the polynomial itself is good enough.
@@ -15,6 +16,8 @@ const BLUNDER_M: f64 = 1.0;
 /// Else it is so many times what the polynomial misses, 0.9 m for a navigation satellite at 15 minutes: an eccentric orbit turns faster
 /// near the Earth than the circle through the place, by which that is reckoned.
 const BLUNDER_TIMES: f64 = 10.0;
+/// The same over what positions of the arc are off it as a rule.
+const USUAL_TIMES: f64 = 8.0;
 /// A polynomial that itself misses more is no judge, m.
 const POLYNOMIAL_M: f64 = 10.0;
 /// GPS time minus BeiDou time, s (exact).
@@ -180,8 +183,9 @@ fn drop_blunders(track: &mut Track) {
         if i < 4 || i + 4 >= n {
             return NONE;
         }
-        // What the polynomial itself misses at its middle: (w h)^8 r (4!)^2 / 8!, at the angular rate seen from the ground.
-        let radius = track.fixed_m[i].norm();
+        // What the polynomial itself misses at its middle: (w h)^8 r (4!)^2 / 8!, at the angular rate seen from the ground where the radius is
+        // least.
+        let radius = (i - 4..=i + 4).map(|j| track.fixed_m[j].norm()).fold(f64::INFINITY, f64::min);
         let rate = (GM_M3_S2 / radius.powi(3)).sqrt() + EARTH_RATE_RAD_S;
         let spacing = (track.t_s[i + 4] - track.t_s[i - 4]) / 8.0;
         let polynomial_m = (rate * spacing).powi(8) * radius / 70.0;
@@ -195,10 +199,12 @@ fn drop_blunders(track: &mut Track) {
         ((through - track.fixed_m[i]).norm(), BLUNDER_M.max(BLUNDER_TIMES * polynomial_m))
     };
     let (misses, most): (Vec<f64>, Vec<f64>) = (0..n).map(miss).unzip();
+    // Positions that scatter by metres are no blunders.
+    let usual = median(misses.iter().zip(&most).filter(|(_, most)| most.is_finite()).map(|(miss, _)| *miss));
     // A blunder spoils its neighbours' polynomials too, by less: only local maxima go.
     let blunder = |i: usize| {
         let around = i.saturating_sub(4)..(i + 5).min(n);
-        misses[i] > most[i] && around.clone().all(|j| misses[j] <= misses[i])
+        misses[i] > most[i].max(USUAL_TIMES * usual) && around.clone().all(|j| misses[j] <= misses[i])
     };
     let keep: Vec<bool> = (0..n).map(|i| !blunder(i)).collect();
     track.masked += keep.iter().filter(|k| !**k).count();

@@ -1,8 +1,8 @@
 //! A triad held still in many poses: the magnitude of gravity is the same in all, so what the ideal triad lacks shows in
 //! it (Tedaldi et al. 2014: bias, scale factors, axes not at right angles; a rigid rotation cannot show).
 //!
-//! a = s T K (u - u0 - b), K = diag(1 + k), T upper triangular with the three small angles: positive where two sensing axes make less
-//! than a right one. The common scale s is a nuisance.
+//! u - u0 - b = diag(1 + k) U a / s, the rows of U being unit vectors along the sensing axes: the product of two of them is the sine of an
+//! angle, positive where they make less than a right one. The common scale s is a nuisance.
 //!
 //! Readings err, and not the magnitude: what a model leaves is |a| - g over its slope by the readings, the distance of a reading from
 //! where the model has the size of gravity (Sampson 1982). Without that, poses about one direction are best explained by a zero far off and a
@@ -173,14 +173,47 @@ fn three(parts: &[Part], unknowns: &DVector<f64>, part: Part) -> Vector3<f64> {
     Vector3::from_fn(|k, _| (0..part.unknowns()).map(|j| rows[k][j] * unknowns[at + j]).sum())
 }
 
+/// The sensing axes: unit vectors, z along that of the frame, y in its y-z plane.
+struct SensingAxes {
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+}
+
+impl SensingAxes {
+    /// From the angles of x and y, x and z, y and z.
+    fn new(angle: &Vector3<f64>) -> Self {
+        let [xy, xz, yz] = [angle.x, angle.y, angle.z].map(f64::sin);
+        let y = Vector3::new(0.0, (1.0 - yz * yz).max(LEAST_COSINE).sqrt(), yz);
+        let along_y = (xy - xz * yz) / y.y;
+        let along_x = (1.0 - along_y * along_y - xz * xz).max(LEAST_COSINE).sqrt();
+        Self { x: Vector3::new(along_x, along_y, xz), y }
+    }
+
+    /// The vector that the axes read as `reading`.
+    fn read_as(&self, reading: &Vector3<f64>) -> Vector3<f64> {
+        let z = reading.z;
+        let y = (reading.y - self.y.z * z) / self.y.y;
+        Vector3::new((reading.x - self.x.y * y - self.x.z * z) / self.x.x, y, z)
+    }
+
+    /// By how much the readings of each axis move something of which the slopes along the frame are `slopes`.
+    fn by_readings(&self, slopes: &Vector3<f64>) -> Vector3<f64> {
+        let x = slopes.x / self.x.x;
+        let y = (slopes.y - self.x.y * x) / self.y.y;
+        Vector3::new(x, y, slopes.z - self.x.z * x - self.y.z * y)
+    }
+}
+
+/// Square of the least cosine that axes on the way to a fit have.
+const LEAST_COSINE: f64 = 1e-4;
+
 fn acceleration(parts: &[Part], unknowns: &DVector<f64>, pose: &Pose) -> Vector3<f64> {
     let bias = three(parts, unknowns, Part::Bias) * BIAS_UNIT;
     let scale = three(parts, unknowns, Part::Scale);
-    let angle = three(parts, unknowns, Part::NonOrthogonality);
+    let axes = SensingAxes::new(&three(parts, unknowns, Part::NonOrthogonality));
     let raw = pose.mean * unknowns[0].exp() - bias;
     // What the recording has: an axis that reads (1 + k) times the truth is divided by it.
-    let a = Vector3::from_fn(|k, _| raw[k] / (1.0 + scale[k]));
-    Vector3::new(a.x - angle.x * a.y - angle.y * a.z, a.y - angle.z * a.z, a.z)
+    axes.read_as(&Vector3::from_fn(|k, _| raw[k] / (1.0 + scale[k])))
 }
 
 /// |a| - g, m/s^2.
@@ -191,34 +224,42 @@ fn misfit(parts: &[Part], unknowns: &DVector<f64>, pose: &Pose, gravity: f64) ->
 /// How far a pose's reading is from where gravity has its size, at the usual scale, m/s^2.
 fn distance(parts: &[Part], unknowns: &DVector<f64>, pose: &Pose, [gravity, usual_scale]: [f64; 2]) -> f64 {
     let scale = three(parts, unknowns, Part::Scale);
-    let angle = three(parts, unknowns, Part::NonOrthogonality);
+    let axes = SensingAxes::new(&three(parts, unknowns, Part::NonOrthogonality));
     let a = acceleration(parts, unknowns, pose);
     let size = a.norm();
-    // Slopes of the size by the readings: those of the directions, by those of the axes.
-    let d = a / size;
-    let turned = Vector3::new(d.x, d.y - angle.x * d.x, d.z - angle.y * d.x - angle.z * d.y);
-    let slope = Vector3::from_fn(|k, _| turned[k] / (1.0 + scale[k])).norm() * unknowns[0].exp();
+    let by_readings = axes.by_readings(&(a / size));
+    let slope = Vector3::from_fn(|k, _| by_readings[k] / (1.0 + scale[k])).norm() * unknowns[0].exp();
     (size - gravity) * usual_scale / slope
 }
+
+/// How large zero, scales and angles of a triad may be, in gravity, shares and radians: where poses do not tell them, as those about one
+/// direction do not, they are no more than that. Poses that do tell them hardly notice.
+const USUAL: f64 = 0.3;
+/// The least that a pose is out by, in gravity.
+const LEAST_ERROR: f64 = 1e-6;
 
 struct Problem<'a> {
     parts: &'a [Part],
     poses: &'a [Pose],
     gravity: f64,
     usual_scale: f64,
+    /// What every unknown is multiplied by to be as likely to be one as a pose is to be out by its error.
+    beliefs: DVector<f64>,
     unknowns: DVector<f64>,
 }
 
 impl Problem<'_> {
+    /// How far the poses are off, and behind them the unknowns.
     fn at(&self, unknowns: &DVector<f64>) -> DVector<f64> {
         let one = |pose: &Pose| distance(self.parts, unknowns, pose, [self.gravity, self.usual_scale]);
-        DVector::from_iterator(self.poses.len(), self.poses.iter().map(one))
+        let believed = unknowns.iter().zip(&self.beliefs).map(|(value, belief)| value * belief);
+        DVector::from_iterator(self.poses.len() + self.beliefs.len(), self.poses.iter().map(one).chain(believed))
     }
 
     /// Central differences: all unknowns are of order one, and the function is smooth.
     fn slopes(&self) -> DMatrix<f64> {
         const STEP: f64 = 1e-5;
-        let mut slopes = DMatrix::zeros(self.poses.len(), self.unknowns.len());
+        let mut slopes = DMatrix::zeros(self.poses.len() + self.beliefs.len(), self.unknowns.len());
         for k in 0..self.unknowns.len() {
             let (mut up, mut down) = (self.unknowns.clone(), self.unknowns.clone());
             up[k] += STEP;
@@ -257,15 +298,23 @@ pub fn fit(parts: &[Part], poses: &[Pose], gravity: f64) -> Triad {
     let mut unknowns = DVector::zeros(1 + parts.iter().map(|p| p.unknowns()).sum::<usize>());
     let usual_scale = gravity / size;
     unknowns[0] = usual_scale.ln();
-    let start = Problem { parts, poses, gravity, usual_scale, unknowns };
+    let error = (rms(&poses.iter().map(|p| p.error).collect::<Vec<f64>>()) * usual_scale).max(LEAST_ERROR * gravity);
+    let mut beliefs = DVector::from_element(unknowns.len(), error / USUAL);
+    // Of the common scale nothing is believed, and biases are of gravity's order.
+    beliefs[0] = 0.0;
+    if let Some(at) = place(parts, Part::Bias) {
+        beliefs.rows_mut(at, 3).fill(error * BIAS_UNIT / (USUAL * gravity));
+    }
+    let start = Problem { parts, poses, gravity, usual_scale, beliefs, unknowns };
     let (solved, _) = levenberg_marquardt::LevenbergMarquardt::new().minimize(start);
-    let residuals: Vec<f64> = solved.at(&solved.unknowns).iter().copied().collect();
+    let residuals: Vec<f64> = solved.at(&solved.unknowns).iter().take(poses.len()).copied().collect();
     let slopes = solved.slopes();
     let free = (poses.len() as f64 - solved.unknowns.len() as f64).max(1.0);
     let variance = residuals.iter().map(|r| r * r).sum::<f64>() / free;
     let n = solved.unknowns.len();
     let inverse =
         slopes.tr_mul(&slopes).try_inverse().unwrap_or_else(|| DMatrix::from_diagonal_element(n, n, f64::MAX));
+    let slopes = slopes.rows(0, poses.len()).into_owned();
     let scale = solved.unknowns[0].exp();
     let misfits = poses.iter().map(|pose| misfit(parts, &solved.unknowns, pose, gravity)).collect();
     let leverages = slopes.row_iter().map(|row| (row * &inverse * row.transpose())[0]).collect();

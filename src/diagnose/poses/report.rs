@@ -9,7 +9,7 @@ use super::{Found, Part, Triad, fit, poses_needed};
 use crate::diagnose::answer::{Covariate, Hypothesis, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::keys::texts;
 use crate::diagnose::measured::answer::{
-    ArcAnswer, Effect, Fit, HeldOut, Level, StepAnswer, in_order, parameter, posterior,
+    ArcAnswer, Effect, Fit, HeldOut, Level, Limit, StepAnswer, in_order, parameter, posterior,
 };
 use crate::diagnose::measured::{Answer, MeasuredCase, log_score};
 use crate::math::rms::rms;
@@ -152,13 +152,28 @@ pub fn answer(case: &MeasuredCase, seen: &Seen) -> Answer {
         hypothesis: remains.map(|r| hypothesis(r, found)),
         unit: "m/s^2".to_owned(),
         fit: Fit { noise_floor: vec![floor], before: level(first), after: level(last), held_out: Some(held) },
-        upper_limits: Vec::new(),
+        upper_limits: if verdict == Verdict::Consistent { limits(case, seen) } else { Vec::new() },
         separating_observation: None,
         cannot_tell_apart: if verdict == Verdict::Ambiguous { sets() } else { Vec::new() },
         arcs: vec![arc],
         steps: found.fits.iter().enumerate().map(step).collect(),
         notes: notes(seen, (scatters && !odd).then(|| [rms(&last.residuals), floor])),
     }
+}
+
+/// How large each part could be that nothing is claimed of and that so many poses can carry: the largest of its three numbers.
+fn limits(case: &MeasuredCase, seen: &Seen) -> Vec<Limit> {
+    let has = &seen.found.fits[0].parts;
+    let open = Part::ALL.into_iter().filter(|part| !has.contains(part));
+    let limit = |part: Part| {
+        let parts = [&has[..], &[part]].concat();
+        let carried = seen.poses.len() >= poses_needed(&parts);
+        let largest =
+            |fit: Triad| fit.values(part).iter().map(|(value, sigma)| value.abs() + 2.0 * sigma).fold(0.0, f64::max);
+        let unit = if part == Part::Bias { unit(case) } else { part.unit().to_owned() };
+        carried.then(|| Limit { id: part.id().to_owned(), limit: largest(fit(&parts, seen.poses, seen.gravity)), unit })
+    };
+    open.filter_map(limit).collect()
 }
 
 /// Where what the poses follow is, and those that are far off.

@@ -25,12 +25,14 @@ impl Truth {
         Self { zero, per_m_s2, bias: Vector3::zeros(), scale: Vector3::zeros(), angle: Vector3::zeros() }
     }
 
-    /// What a triad of this kind reads: the inverse of the model, solved from the last axis up.
+    /// What a triad of this kind reads, of axes that are unit vectors whose products are the sines of the angles: x along that of the frame,
+    /// where the model has z, since a rotation cannot show.
     fn reading(&self, a: &Vector3<f64>) -> Vector3<f64> {
-        let z = a.z;
-        let y = a.y + self.angle.z * z;
-        let x = a.x + self.angle.x * y + self.angle.y * z;
-        let own = Vector3::new(x, y, z).component_mul(&(Vector3::repeat(1.0) + self.scale));
+        let [xy, xz, yz] = [self.angle.x, self.angle.y, self.angle.z].map(f64::sin);
+        let y = Vector3::new(xy, (1.0 - xy * xy).sqrt(), 0.0);
+        let along_y = (yz - xy * xz) / y.y;
+        let z = Vector3::new(xz, along_y, (1.0 - xz * xz - along_y * along_y).sqrt());
+        let own = Vector3::new(a.x, y.dot(a), z.dot(a)).component_mul(&(Vector3::repeat(1.0) + self.scale));
         own * self.per_m_s2 + self.bias + Vector3::repeat(self.zero)
     }
 
@@ -78,6 +80,41 @@ fn an_ideal_triad_lacks_nothing_whatever_its_unit() {
         let answer = diagnosed(Truth::ideal(zero, per).rows(24, 0.01, &mut rng), unit);
         assert_eq!((answer.verdict, answer.effects.len()), (Verdict::Consistent, 0), "{unit}");
         assert_eq!(answer.arcs[0].fitted, 24);
+    }
+}
+
+/// Axes of equal gains that are not at right angles: the gains are not the diagonal of a matrix.
+#[test]
+fn axes_far_from_right_angles_are_of_equal_scale() {
+    let mut rng = ChaCha12Rng::seed_from_u64(61);
+    let angle = Vector3::new(0.02, -0.015, 0.03);
+    let answer = diagnosed(Truth { angle, ..Truth::ideal(0.0, 1.0) }.rows(40, 0.01, &mut rng), "m_s2");
+    let ids: Vec<&str> = answer.effects.iter().map(|e| e.id.as_str()).collect();
+    assert_eq!((answer.verdict, &ids[..]), (Verdict::Explained, &["non_orthogonality"][..]));
+    for (parameter, truth) in answer.effects[0].parameters.iter().zip(angle.iter()) {
+        assert!((parameter.value - truth).abs() < 4.0 * parameter.sigma, "{parameter:?} {truth}");
+    }
+}
+
+/// Poses about one direction tell a zero, scales and angles one from another by nothing: that is no reason to find anything in them.
+#[test]
+fn poses_about_one_direction_are_no_structure() {
+    for seed in 0..60 {
+        let mut rng = ChaCha12Rng::seed_from_u64(700 + seed);
+        let n = 14 + (seed as usize % 4) * 6;
+        let poses: Vec<Pose> = (0..n)
+            .map(|i| {
+                let about = Vector3::new(0.03 * normal(&mut rng), 0.03 * normal(&mut rng), 1.0).normalize() * G;
+                let off = Vector3::new(normal(&mut rng), normal(&mut rng), normal(&mut rng)) * 1e-3;
+                Pose { start_s: i as f64, end_s: i as f64 + 0.5, mean: (about + off) * 400.0, scatter: 4.0, error: 0.4 }
+            })
+            .collect();
+        let (kept, far_off) = without_blunders(poses, G);
+        assert!(far_off.left_out().is_empty(), "{seed}: {far_off:?}");
+        assert!(search(&[], &kept, G).added.is_empty(), "{seed}");
+        let parts = fullest(kept.len()).unwrap();
+        let remains = structure::structure(&fit(parts, &kept, G), &kept).unwrap();
+        assert!(remains.probability > 1e-3, "{seed}: {remains:?}");
     }
 }
 

@@ -4,7 +4,7 @@
 use super::follow::{Follows, equation};
 use super::read::{Axis, Series};
 use super::red::{self, Beat, Noise};
-use super::search::{candidates, design, plain};
+use super::search::{candidates, design, golden, plain};
 use crate::diagnose::earlier::REACH_S;
 
 /// The likeliest instants of a step that are weighed in full.
@@ -134,5 +134,10 @@ pub(super) fn likely_lines(series: &Series, axis: &Axis, model: &[Follows], beat
         let [sine, cosine] = [fit[model.len()], fit[model.len() + 1]];
         (Follows::Line(span_s / cycles, cosine.atan2(sine)), in_noise(&with))
     };
-    likeliest(cycles.map(line), IN_TIME)
+    let finer = |follows: Follows| {
+        let Follows::Line(period_s, _) = follows else { return follows };
+        let cycles = span_s / period_s;
+        line(golden(cycles - 0.5, cycles + 0.5, 16, &mut |cycles| line(cycles).1)).0
+    };
+    likeliest(cycles.map(line), IN_TIME).into_iter().map(finer).collect()
 }

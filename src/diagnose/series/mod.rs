@@ -4,6 +4,7 @@
 //! Everything is judged on block means, against a slow wander as the competitor (`red`): a wander agrees with any slow
 //! covariate by chance. Not here: orbits, poses.
 
+mod blunders;
 pub mod follow;
 pub mod form;
 mod likely;

@@ -1,7 +1,8 @@
 //! A CSV of a sensor with covariates, as its `case.toml` describes it, to block means.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use super::blunders;
 use crate::diagnose::keys::lookup;
 use crate::diagnose::measured::spread::{median, scatter};
 use crate::diagnose::measured::{MeasuredCase, MeasuredError};
@@ -126,7 +127,9 @@ pub fn series(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<S
     let references: Vec<Column> = values.iter().filter_map(Column::its_reference).collect();
     let needed = values.len() + controls.len();
     let all: Vec<&Column> = values.iter().chain(&controls).chain(&references).chain(&covariates).collect();
-    let (t_s, mut table, masked) = rows(case, &file, &files[&file], &all, needed + references.len())?;
+    let (t_s, mut table, mut masked) = rows(case, &file, &files[&file], &all, needed + references.len())?;
+    let taken_out: BTreeSet<usize> = table.iter_mut().flat_map(|column| blunders::taken_out(column)).collect();
+    masked += taken_out.len();
     // What nobody can read is followed by nothing that could be shown.
     let (mut read, mut unread) = (Vec::new(), Vec::new());
     for (column, values) in covariates.into_iter().zip(table.split_off(needed + references.len())) {

@@ -97,8 +97,16 @@ impl Row<'_> {
         let one = |(i, (follows, score)): (usize, &(Follows, f64))| {
             let (was, is) = (self.found.fits[i].rms(), self.found.fits[i + 1].rms());
             let with = match follows {
+                Follows::Temperature(k, lag_s) if *lag_s > 0.0 => {
+                    format!(
+                        " Covariate: {}, followed with a time constant, which lag_s is.",
+                        self.series.covariates[*k].name
+                    )
+                }
                 Follows::Temperature(k, _) => format!(" Covariate: {}.", self.series.covariates[*k].name),
-                Follows::Delayed(k, _) => format!(" Covariate: {}, delayed.", self.series.covariates[*k].name),
+                Follows::Delayed(k, _) => {
+                    format!(" Covariate: {}, as it was lag_s before.", self.series.covariates[*k].name)
+                }
                 Follows::Field(k) => format!(" Covariate: {}.", self.series.covariates[*k].name),
                 _ => String::new(),
             };
@@ -166,7 +174,7 @@ impl Row<'_> {
         let note = slow.then(|| {
             let removed = 100.0 * (1.0 - (last.rms() / first.rms()).powi(2));
             format!(
-                "{:.3e} {} rms stays, {left:.0} times the scatter from block to block ({removed:.0} % of the variance is explained): something slow is left that no covariate accounts for, and is taken as noise.",
+                "{:.3e} {} rms is left, {left:.0} times the scatter from block to block ({removed:.0} % of the variance is explained): something slow is left that no covariate accounts for, and is taken as noise.",
                 last.rms(),
                 self.axis.unit,
             )
@@ -216,7 +224,8 @@ impl Row<'_> {
             }
             Follows::Pulse(from_s, length_s) => format!("(1 from {from_s:.0} s to {:.0} s, else 0)", from_s + length_s),
             Follows::Line(period_s, phase) => {
-                format!("sin(2 pi (t - {:.0} s)/{period_s:.0} s + {phase:.2})", self.series.t_s[0])
+                let (sign, phase) = if *phase < 0.0 { ('-', -phase) } else { ('+', *phase) };
+                format!("sin(2 pi (t - {:.0} s)/{period_s:.0} s {sign} {phase:.2})", self.series.t_s[0])
             }
             _ => return None,
         };
@@ -235,27 +244,28 @@ impl Row<'_> {
         })
     }
 
-    /// How large what the catalogue has could be, where nothing is claimed: of each effect the loosest of what was tried, a step at a
+    /// How large what the catalogue has could be, beside what is claimed of it: of each effect the loosest of what was tried, a step at a
     /// quarter, half and three quarters of the record, a decay that is over within it.
     fn limits(&self) -> Vec<Limit> {
         let still = self.found.last().rms() <= self.axis.rounding();
-        if still || !self.found.effects.is_empty() || self.found.form.is_some() {
+        if still || self.found.form.is_some() {
             return Vec::new();
         }
+        let known = self.found.model();
         let t_s = &self.series.t_s;
         let within = |part: f64| t_s[0] + part * (t_s[t_s.len() - 1] - t_s[0]);
         let steps = [0.25, 0.5, 0.75].map(|part| Follows::Step(within(part)));
         let mut limits: Vec<(String, Limit)> = Vec::new();
         for follows in candidates(self.series, self.axis).into_iter().chain(steps) {
-            let model = [&self.found.included[..], &[follows]].concat();
+            let model = [&known[..], &[follows]].concat();
             let beyond = matches!(follows, Follows::Drift(tau_s) if tau_s > within(1.0) - t_s[0]);
             // Nor has a coefficient of what does not change a limit.
             let column = equation(self.series, self.axis, &[follows]).columns.swap_remove(0);
             let constant = rms_about_mean(&column) <= 1e-9 * rms(&column);
-            if beyond || constant || self.found.included.iter().any(|has| has.excludes(&follows)) {
+            if beyond || constant || known.iter().any(|has| has.excludes(&follows)) {
                 continue;
             }
-            let (value, sigma) = regress(self.series, self.axis, &model).coefficients[self.found.included.len()];
+            let (value, sigma) = regress(self.series, self.axis, &model).coefficients[known.len()];
             let limit = value.abs() + 2.0 * sigma;
             if !limit.is_finite() {
                 continue;

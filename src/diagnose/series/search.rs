@@ -182,7 +182,9 @@ fn best_form(
     let mut fit = regress(series, axis, &model);
     let sigma = inner_sigma(series, axis, &model, last, beat);
     widen(series, axis, &model, last, &[sigma], &mut fit.coefficients);
-    Some((model[last], score, fit))
+    // What the noise about it may have made as well is nothing to tell.
+    let (value, sigma) = fit.coefficients[last];
+    (value.abs() > CLAIMED_SIGMA * sigma).then_some((model[last], score, fit))
 }
 
 struct Step {
@@ -327,7 +329,8 @@ pub(super) fn plain(series: &Series, axis: &Axis, model: &[Follows]) -> Vec<f64>
     model.iter().enumerate().map(|(j, f)| from(f) + solution[series.spans + j]).collect()
 }
 
-fn golden(mut low: f64, mut high: f64, steps: usize, value: &mut dyn FnMut(f64) -> f64) -> f64 {
+/// Where a value is largest between two bounds, by so many golden sections.
+pub(super) fn golden(mut low: f64, mut high: f64, steps: usize, value: &mut dyn FnMut(f64) -> f64) -> f64 {
     let (mut a, mut b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
     let (mut fa, mut fb) = (value(a), value(b));
     for _ in 0..steps {

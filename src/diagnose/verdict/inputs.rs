@@ -2,7 +2,7 @@
 //! found in it.
 
 use crate::diagnose::bursts::OUT;
-use crate::diagnose::case::{Event, KINDS_TRIED, SPIKE};
+use crate::diagnose::case::{Event, KINDS_TRIED, SPIKE, unresolved};
 use crate::diagnose::catalogue::LOGGED_KINDS;
 use crate::diagnose::noise::Contradicted;
 use crate::diagnose::scene::Scene;
@@ -10,10 +10,14 @@ use crate::diagnose::scene::Scene;
 /// A log all of whose entries are farther from the recording may be of another clock, s.
 const LOG_AWAY_S: f64 = 2.0 * 86_400.0;
 
+/// Share of the swing of the body rates that must be missed between rows for it to be told.
+const UNRESOLVED: f64 = 0.02;
+
 /// All of it, in sentences.
 pub fn of_inputs(scene: &Scene) -> Vec<String> {
     let mut notes: Vec<String> = scene.case.recording.not_come.iter().cloned().collect();
     notes.extend(of_windows(scene));
+    notes.extend(of_the_motion(scene));
     notes.extend(of_the_log(scene));
     notes.extend(of_the_noise(scene));
     notes
@@ -36,6 +40,18 @@ fn of_windows(scene: &Scene) -> Vec<String> {
         (case.windows_of_spikes, &spikes),
     ];
     told.iter().filter(|(count, _)| *count > 0).map(|(count, why)| format!("{count} {why}")).collect()
+}
+
+/// Rows of ancillary data that are too few for the motion.
+fn of_the_motion(scene: &Scene) -> Option<String> {
+    let share = unresolved(&scene.case.ancillary);
+    (share > UNRESOLVED).then(|| {
+        format!(
+            "the vehicle's rates change faster than the rows of the ancillary data tell: what comes of their changes (rotation, an offset of the \
+             sensor) is known to some {:.0} % alone, whatever its error says",
+            100.0 * share
+        )
+    })
 }
 
 /// A log of more kinds than are tried, of another spelling, or of another clock.

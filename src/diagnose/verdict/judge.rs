@@ -11,6 +11,8 @@ use crate::diagnose::trial::Tried;
 
 /// Log odds by which a set that cannot be believed must be above all that can, for those to be no explanation.
 const REFUSED_MARGIN: f64 = 3.0;
+/// Log odds, of twenty as of any second effect, by which a set must be above one that it is but for a formula more.
+const BESIDE_MARGIN: f64 = 3.0;
 /// A finding that fails its trial is still a mismatch when noise makes its evidence this much more rarely than a claim asks.
 const BEYOND_DOUBT: f64 = 0.05;
 
@@ -34,6 +36,12 @@ pub struct Judged<'a> {
     pub open_wins: bool,
 }
 
+/// Whether a set has all members of another.
+fn has_all_of(set: &Weighed, other: &Weighed) -> bool {
+    let key = set.set.key();
+    other.set.key().iter().all(|entry| key.contains(entry))
+}
+
 /// Judges; `listed` are the sets of listed effects that can be believed, best first.
 pub fn judge<'a>(
     scene: &Scene,
@@ -48,7 +56,9 @@ pub fn judge<'a>(
         [listed.first().copied(), solution.listed.first(), solution.open.first()].map(|w| (height(w), w));
     let refused = best.0 - top.0 > REFUSED_MARGIN;
     let to_beat = if refused { best.0 } else { top.0 };
-    let open_wins = open.0 > to_beat.max(null);
+    let leads = if refused { best.1 } else { top.1 };
+    let is_beside = open.1.zip(leads).is_some_and(|(open, listed)| has_all_of(open, listed));
+    let open_wins = open.0 > (to_beat + if is_beside { BESIDE_MARGIN } else { 0.0 }).max(null);
     let claimed = probability <= asked(claim) && best.0.max(open.0) > null;
     let (verdict, chosen) = match (claimed, open_wins, refused) {
         (false, _, _) => (Verdict::Consistent, None),

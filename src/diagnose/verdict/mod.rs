@@ -3,6 +3,7 @@
 
 mod again;
 mod another_course;
+mod another_lag;
 mod claims;
 mod credible;
 mod faults;
@@ -20,6 +21,7 @@ mod unnamed;
 
 use self::again::again;
 use self::another_course::{AnotherCourse, another_course};
+use self::another_lag::of_another_lag;
 use self::claims::{of_claims, of_unknown_claims, of_unknown_keys};
 use self::credible::credible;
 use self::fit::fit;
@@ -157,7 +159,7 @@ fn of_the_mismatch(
     notes.extend(of_unknown_claims(scene));
     notes.extend(of_proportion(scene));
     notes.extend(of_the_simulation(scene));
-    notes.extend(of_resonances(&solution.null));
+    notes.extend(of_resonances(scene, &solution.null));
     notes.extend(of_colour(solution.statistic(), proof.statistic));
     let (listed, refusals) = credible(scene, library, &solution.listed);
     notes.extend(refusals);
@@ -264,6 +266,7 @@ impl Findings<'_> {
             }
         } else {
             answer.notes.extend(of_assumptions(scene, library, &best.set));
+            answer.notes.extend(of_another_lag(scene, library, &best.frame, &best.set));
             name(&mut answer, scene, library, &best, &self.listed, &self.solution.open);
             // A limit is beside the first set: of what another set has in its place it says nothing.
             let Diagnosis { upper_limits, cannot_tell_apart, .. } = &mut answer;
@@ -284,13 +287,19 @@ fn ladder(library: &Library, solution: &Solution) -> Vec<(String, f64)> {
 }
 
 /// Says which axes are taken to have noise of the second order.
-fn of_resonances(null: &Weighed) -> Vec<String> {
+fn of_resonances(scene: &Scene, null: &Weighed) -> Vec<String> {
+    let has_crew = !scene.case.spans("crew_sleep").is_empty();
     let told = |(axis, noise): (&str, &AxisNoise)| {
         let Resonance { rms_ng, period_s, tau_s, follows_crew } = noise.resonance?;
-        let when = if follows_crew { "louder when the crew is awake" } else { "whatever the crew does" };
+        let when = match (has_crew, follows_crew) {
+            (false, _) => "",
+            (true, true) => ", louder when the crew is awake",
+            (true, false) => ", whatever the crew does",
+        };
+        let decimals = (1.0 - rms_ng.log10().floor()).clamp(0.0, 6.0) as usize;
         Some(format!(
-            "the noise of axis {axis} is taken to resonate, {rms_ng:.0} ng about a period of {period_s:.0} s, its phase forgotten in \
-             {tau_s:.0} s, {when}: the windows make that likelier than a line or none, at the price of its three numbers"
+            "the noise of axis {axis} is taken to resonate, {rms_ng:.decimals$} ng about a period of {period_s:.0} s, its phase forgotten in \
+             {tau_s:.0} s{when}: the windows make that likelier than a line or none, at the price of its three numbers"
         ))
     };
     ["x", "y", "z"].into_iter().zip(&null.noise).filter_map(told).collect()
