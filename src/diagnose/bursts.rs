@@ -12,6 +12,12 @@ use super::solve::{Library, Solution, Stop, null_noise, solve_unless};
 pub const OUT: f64 = 5.0;
 /// Degrees of freedom of the tails.
 const DEGREES: f64 = 4.0;
+/// Whitened residual of the other sign, of the window after one out of the ordinary, that tells that nothing of that was in it.
+const CONTRADICTED: f64 = 2.5;
+/// Windows for which one out of the ordinary may put others out.
+const REACH: usize = 20;
+/// Looks at what is left, each beside the bursts of the one before: as many of such a stretch are found.
+const LOOKS: usize = 24;
 /// Searches, each beside the bursts of the one before.
 const ROUNDS: usize = 3;
 
@@ -38,8 +44,7 @@ pub fn solve_beside_bursts(
     }
     for _ in 1..ROUNDS {
         let best = solution.best();
-        let (whitened, noise) = (best.left(scene, &library.entries).whitened, best.noise);
-        if !mark(scene, &whitened, &noise) {
+        if !settle(scene, &best.noise, |scene| best.left(scene, &library.entries).whitened) {
             break;
         }
         solution = solve_unless(scene, library, null_noise(scene, Some(&solution.null.noise)), stop)?;
@@ -65,8 +70,7 @@ fn all_taken_for_bursts(scene: &mut Scene, library: &Library, noise_null: &[Axis
     let mut noise = *noise_null;
     for _ in 0..ROUNDS {
         let null = search::weigh_with_own_noise(scene, &library.entries, &Set::default(), &noise, 0, 0);
-        let whitened = null.left(scene, &library.entries).whitened;
-        if !mark(scene, &whitened, &noise) {
+        if !settle(scene, &noise, |scene| null.left(scene, &library.entries).whitened) {
             break;
         }
         noise = null_noise(scene, Some(&noise));
@@ -74,23 +78,58 @@ fn all_taken_for_bursts(scene: &mut Scene, library: &Library, noise_null: &[Axis
     noise
 }
 
-/// Gives the windows of all axes their bursts; whether there are any new ones.
-fn mark(scene: &mut Scene, whitened: &Axes, noise: &[AxisNoise; 3]) -> bool {
-    let marked = |k: usize| weigh_less(&mut scene.loudness[k], &whitened[k], &noise[k], &scene.schedule);
-    (0..3).map(marked).fold(false, |any, marked| any | marked)
+/// Gives windows their bursts, and looks again at what is then left, until there are no more; whether there are any.
+fn settle(scene: &mut Scene, noise: &[AxisNoise; 3], left: impl Fn(&Scene) -> Axes) -> bool {
+    for look in 0..LOOKS {
+        let whitened = left(scene);
+        let marked = |k: usize| weigh_less(&mut scene.loudness[k], &whitened[k], &noise[k], &scene.schedule);
+        if !(0..3).map(marked).fold(false, |any, marked| any | marked) {
+            return look > 0;
+        }
+    }
+    true
 }
 
-/// Gives windows their bursts where the whitened residual is out of the ordinary; whether there are any new ones.
+/// Gives windows their bursts where the whitened residual is out of the ordinary, the first of those near to each other alone, since the
+/// others may be out for its sake; whether there are any new ones.
+///
+/// A burst is in the samples that are new to a window, and in the next window as much. One that is in a window alone, since the trimmed mean
+/// of the next threw it out, or by another share in the next, is of the window itself: as a burst of samples it would be looked for in the next
+/// one, and what that lacks of it in the one after, and so on.
 fn weigh_less(loudness: &mut Loudness, whitened: &[f64], noise: &AxisNoise, schedule: &Schedule) -> bool {
-    let out: Vec<(usize, &f64)> = whitened.iter().enumerate().filter(|(_, z)| z.abs() > OUT).collect();
+    let shares = |i: usize| i < schedule.len() && schedule.shares_of_samples(i)[1] > 0.0;
+    let is_out = |i: &usize| whitened[*i].abs() > OUT;
+    let mut out: Vec<usize> = Vec::new();
+    for i in (0..whitened.len()).filter(is_out) {
+        // A gap ends what a window is out by for the sake of others.
+        let is_near = |before: &usize| i - before < REACH && (before + 1..=i).all(shares);
+        if !out.last().is_some_and(is_near) {
+            out.push(i);
+        }
+    }
     if out.is_empty() {
         return false;
     }
     let whitener = Whitener::new(noise, schedule, loudness);
-    for (i, z) in out {
-        // The variance of the innovation that Student's t gives it, all of it in the samples that are new to the window.
+    for i in out {
+        let z = whitened[i];
+        // The variance of the innovation that Student's t gives it.
         let more = (DEGREES + z * z) / (DEGREES + 1.0) - 1.0;
-        loudness.burst[i] += more / whitener.new_share(i, noise, schedule, loudness);
+        let of_new = more / whitener.new_share(i, noise, schedule, loudness);
+        let own = schedule.shares_of_samples(i)[0].powi(2);
+        // The filter expects of the next window what was in this one.
+        let contradicted = shares(i + 1) && z * whitened[i + 1] < 0.0 && whitened[i + 1].abs() > CONTRADICTED;
+        let contradicts = shares(i) && loudness.is_odd(i - 1);
+        if contradicts && loudness.burst[i - 1] > 1.0 {
+            loudness.alone[i - 1] += schedule.shares_of_samples(i - 1)[0].powi(2) * (loudness.burst[i - 1] - 1.0);
+            loudness.burst[i - 1] = 1.0;
+        }
+        if contradicted || contradicts {
+            loudness.alone[i] += own * of_new;
+        } else {
+            // All of it in the samples that are new to the window.
+            loudness.burst[i] += of_new;
+        }
     }
     true
 }
@@ -134,6 +173,32 @@ mod tests {
         let found: Vec<usize> = (0..schedule.len()).filter(|i| loudness.burst[*i] > 1.0).collect();
         assert!(!found.is_empty() && found.iter().all(|i| bursts.contains(i)), "{found:?}");
         assert!(left.iter().all(|w| w.abs() < OUT));
+    }
+
+    /// A window that is off for itself, and one of which the next has a third: neither runs on.
+    #[test]
+    fn what_is_in_one_window_alone_is_of_that_window() {
+        for shared in [0.0, 0.3] {
+            let (schedule, mut loudness, mut x) = record(&[]);
+            for i in [500, 1700, 3100] {
+                x[i] += 1500.0;
+                x[i + 1] += shared * 1500.0;
+            }
+            let whitened = |loudness: &Loudness| Whitener::new(&NOISE, &schedule, loudness).whiten(&x);
+            let mut left = whitened(&loudness);
+            for _ in 0..LOOKS {
+                if !weigh_less(&mut loudness, &left, &NOISE, &schedule) {
+                    break;
+                }
+                left = whitened(&loudness);
+            }
+            let odd: Vec<usize> = (0..schedule.len()).filter(|i| loudness.is_odd(*i)).collect();
+            assert!(
+                odd.len() <= 6 && odd.iter().all(|i| [500, 501, 1700, 1701, 3100, 3101].contains(i)),
+                "{shared}: {odd:?}"
+            );
+            assert!(left.iter().all(|w| w.abs() < OUT));
+        }
     }
 
     #[test]

@@ -16,7 +16,7 @@ use crate::units::NANO_G_M_S2;
 use super::case::{Case, Expectation, HALF_WINDOW_S, Recording};
 use super::earlier;
 use super::error::CaseError;
-use super::measure::{Measurement, coverage, union};
+use super::measure::{self, Measurement, coverage, union};
 use super::noise::{self, Contradicted, Flips, Loudness, Schedule};
 use super::recorder::NEGLIGIBLE_NG;
 
@@ -238,7 +238,7 @@ impl<'a> Scene<'a> {
         let residual_ng: Axes =
             std::array::from_fn(|k| case.recording.a_ng[k].iter().zip(&simulated_ng[k]).map(|(a, m)| a - m).collect());
         Self {
-            schedule: Schedule::new(windows).with_shared(shared_errors(&case.recording, &simulated_ng)).with_flips(
+            schedule: Schedule::new(windows).with_shared(shared_errors(case, &to_windows, &simulated_ng)).with_flips(
                 case.recording.bias_laws.each_ref().map(|laws| laws.iter().map(|law| &law.flips).collect()),
             ),
             loudness,
@@ -331,14 +331,19 @@ impl<'a> Scene<'a> {
 }
 
 /// What the calibration leaves open, the same in all windows, ng: of the scale factor in proportion to what is expected, for what was
-/// recorded holds the noise that is to be explained.
-fn shared_errors(recording: &Recording, simulated_ng: &Axes) -> [Vec<Vec<f64>>; 3] {
+/// recorded holds the noise that is to be explained. And what is missed of the simulation between its rows: in no window much, and in all of a
+/// quick motion the same.
+fn shared_errors(case: &Case, to_windows: &Measurement, simulated_ng: &Axes) -> [Vec<Vec<f64>>; 3] {
+    let recording = &case.recording;
     std::array::from_fn(|k| {
+        let missed = about_mean(
+            &to_windows.apply(&measure::missed_by_cubics(&case.simulation.clock_s, &case.simulation.a_ng[k])),
+        );
         let of_scale = recording.scale_errors[k].iter().map(|shares| {
             let errors: Vec<f64> = shares.iter().zip(&simulated_ng[k]).map(|(share, ng)| share * ng).collect();
             about_mean(&errors)
         });
-        let told = of_scale.filter(|errors| rms_about_mean(errors) > NEGLIGIBLE_NG);
+        let told = of_scale.chain([missed]).filter(|errors| rms_about_mean(errors) > NEGLIGIBLE_NG);
         recording.bias_errors_ng[k].iter().cloned().chain(told).collect()
     })
 }

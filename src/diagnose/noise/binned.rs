@@ -67,7 +67,7 @@ fn bins(schedule: &Schedule, loudness: &Loudness) -> Vec<Vec<usize>> {
     let bin = |i: usize| ((schedule.clock_s[i] - schedule.clock_s[0]) / BIN_S) as usize;
     let n = schedule.len();
     let mut bins = vec![Vec::new(); if n == 0 { 0 } else { bin(n - 1) + 1 }];
-    let bursts = |i: usize| loudness.burst[i] > 1.0 || (i > 0 && loudness.burst[i - 1] > 1.0);
+    let bursts = |i: usize| loudness.is_odd(i) || (i > 0 && loudness.burst[i - 1] > 1.0);
     (0..n).filter(|i| !bursts(*i)).for_each(|i| bins[bin(i)].push(i));
     bins
 }

@@ -86,7 +86,7 @@ fn rows<const R: usize>(noise: &AxisNoise, schedule: &Schedule, loudness: &Loudn
     let mut log_det = LogSum::new();
     let rows = (0..schedule.len())
         .map(|i| {
-            let (row, variance) = riccati.row(i, [loudness.activity[i]], [loudness.burst[i]]);
+            let (row, variance) = riccati.row(i, [loudness.activity[i]], [loudness.burst[i]], [loudness.alone[i]]);
             log_det.add(variance);
             row
         })

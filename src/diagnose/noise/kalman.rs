@@ -84,9 +84,9 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
         }
     }
 
-    /// The row of window `i` at activities `s` and bursts, and the variances of its innovations; windows in order.
+    /// The row of window `i` at activities `s`, bursts and what it has for itself, and the variances of its innovations; windows in order.
     #[inline(always)]
-    pub(super) fn row(&mut self, i: usize, s: [f64; L], burst: [f64; L]) -> (Row<L, R>, [f64; L]) {
+    pub(super) fn row(&mut self, i: usize, s: [f64; L], burst: [f64; L], alone: [f64; L]) -> (Row<L, R>, [f64; L]) {
         let [own, previous] = self.schedule.overlap[i];
         let step = self.schedule.step_s[i];
         if step != self.step_before {
@@ -137,7 +137,8 @@ impl<'a, const L: usize, const R: usize> Riccati<'a, L, R> {
                 seen += hr * cr[r][0];
                 row.resonance_h[r][l] = hr;
             }
-            variance[l] = h0 * c0 + h1 * c1 + h2 * c2 + v2 * slow.new_seen + seen + own * ce;
+            let of_itself = self.variance[0][l] * s[l] * s[l] * alone[l];
+            variance[l] = h0 * c0 + h1 * c1 + h2 * c2 + v2 * slow.new_seen + seen + own * ce + of_itself;
             c2 += v2 * slow.of_both;
             let inverse = 1.0 / variance[l];
             let gain = [ce * inverse, c1 * inverse, c2 * inverse];

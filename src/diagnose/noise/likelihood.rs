@@ -85,6 +85,7 @@ fn products_with<const L: usize, const R: usize>(
 ) -> [Products; L] {
     let n = schedule.len();
     let (activity, burst) = (loudness.map(|a| &a.activity[..n]), loudness.map(|a| &a.burst[..n]));
+    let alone = loudness.map(|a| &a.alone[..n]);
     let data = series.map(|s| &s.data[..n]);
     let errors = series.iter().map(|s| s.shared.len()).max().unwrap_or(0);
     // A series that shares fewer errors than another has some that are nothing.
@@ -99,7 +100,7 @@ fn products_with<const L: usize, const R: usize>(
     // Of every error with the series, with the constant, and with the errors up to itself.
     let mut error_sums = vec![[0.0; L]; errors * (errors + 5) / 2];
     for i in 0..n {
-        let (row, variance) = riccati.row(i, activity.map(|a| a[i]), burst.map(|b| b[i]));
+        let (row, variance) = riccati.row(i, activity.map(|a| a[i]), burst.map(|b| b[i]), alone.map(|a| a[i]));
         log_det.add(variance);
         let d = memory[0].whiten(&row, std::array::from_fn(|l| data[l][i]));
         let c = memory[1].whiten(&row, [1.0; L]);

@@ -11,12 +11,15 @@ pub struct Loudness {
     /// Variance of the samples that a window is the first to have, over their usual one: above 1 where they are out of the ordinary.
     /// The window after it shares them, so that a burst is one event, not two.
     pub burst: Vec<f64>,
+    /// Variance that a window has for itself, over that of its new samples: above nothing where it is out of the ordinary and the window that
+    /// shares samples with it is not, as a trimmed mean may be.
+    pub alone: Vec<f64>,
 }
 
 impl Loudness {
     /// Of activity alone: no bursts.
     pub fn even(activity: Vec<f64>) -> Self {
-        Self { burst: vec![1.0; activity.len()], activity }
+        Self { burst: vec![1.0; activity.len()], alone: vec![0.0; activity.len()], activity }
     }
 
     /// From the crew's sleep: so loud awake, and so loud asleep.
@@ -42,12 +45,18 @@ impl Loudness {
         let mut longer = self.clone();
         longer.activity.resize(windows, level);
         longer.burst.resize(windows, 1.0);
+        longer.alone.resize(windows, 0.0);
         longer
     }
 
     /// Some of the windows.
     pub fn pick(&self, index: &[usize]) -> Self {
         let of = |series: &[f64]| index.iter().map(|i| series[*i]).collect();
-        Self { activity: of(&self.activity), burst: of(&self.burst) }
+        Self { activity: of(&self.activity), burst: of(&self.burst), alone: of(&self.alone) }
+    }
+
+    /// Whether a window is out of the ordinary.
+    pub fn is_odd(&self, i: usize) -> bool {
+        self.burst[i] > 1.0 || self.alone[i] > 0.0
     }
 }

@@ -158,6 +158,11 @@ impl Schedule {
         Self { flips, ..self }
     }
 
+    /// Coefficients, in a window, of the noise of the samples that are new to it and of those that the window before had.
+    pub fn shares_of_samples(&self, i: usize) -> [f64; 2] {
+        self.overlap[i]
+    }
+
     /// Number of windows.
     pub fn len(&self) -> usize {
         self.clock_s.len()
@@ -215,7 +220,11 @@ pub fn simulate(
             let [a, b] = schedule.overlap[i];
             let value = a * own + b * previous + loudness.activity[i] * short + oscillating + slow;
             previous = own;
-            value
+            let alone = loudness.alone[i];
+            // Nothing is drawn where a window has nothing for itself.
+            let of_itself =
+                if alone > 0.0 { noise.white_ng * loudness.activity[i] * alone.sqrt() * normal() } else { 0.0 };
+            value + of_itself
         })
         .collect()
 }
@@ -246,6 +255,7 @@ pub(super) mod tests {
         let schedule = Schedule { slow_seen: SlowSeen::Mean, ..gappy() };
         let mut loudness = Loudness::even((0..schedule.len()).map(|i| if i > 1500 { 0.6 } else { 1.2 }).collect());
         loudness.burst.iter_mut().step_by(40).for_each(|burst| *burst = 30.0);
+        loudness.alone.iter_mut().skip(20).step_by(40).for_each(|alone| *alone = 30.0);
         let x = simulate(&noise, &schedule, &loudness, normals(3));
         let w = Whitener::new(&noise, &schedule, &loudness).whiten(&x);
         let n = w.len() as f64;

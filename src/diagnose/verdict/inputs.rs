@@ -124,7 +124,8 @@ fn of_the_noise(scene: &Scene) -> Vec<String> {
              so many times as loud as in the middle one: {levels}"
         )
     }));
-    let bursts: usize = scene.loudness.iter().map(|axis| axis.burst.iter().filter(|b| **b > 1.0).count()).sum();
+    let bursts: usize =
+        scene.loudness.iter().map(|axis| (0..axis.burst.len()).filter(|i| axis.is_odd(*i)).count()).sum();
     if bursts > 0 {
         notes.push(format!(
             "{bursts} values out of the ordinary weigh less: more than {OUT} standard deviations of the noise"
