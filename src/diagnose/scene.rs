@@ -13,7 +13,7 @@ use crate::math::shared_work;
 use crate::physics::{self, Mat3, Vec3};
 use crate::units::NANO_G_M_S2;
 
-use super::case::{Case, Expectation, HALF_WINDOW_S, Recording};
+use super::case::{Case, Expectation, HALF_WINDOW_S};
 use super::earlier;
 use super::error::CaseError;
 use super::measure::{self, Measurement, coverage, union};

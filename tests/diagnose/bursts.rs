@@ -46,9 +46,11 @@ fn spikes_at_chance_instants_are_no_finding() {
             let mut steps: Vec<f64> = axis.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
             steps.sort_by(f64::total_cmp);
             let deviation_ng = 1.5 * steps[steps.len() / 2];
-            for x in axis.iter_mut().filter(|_| rng.random::<f64>() < 0.01) {
-                let size = 5.0 * 8.0_f64.powf(rng.random::<f64>()) * deviation_ng;
-                *x += if rng.random::<bool>() { size } else { -size };
+            for x in axis.iter_mut() {
+                let [is_off, size, sign] = std::array::from_fn(|_| rng.random::<f64>());
+                if is_off < 0.01 {
+                    *x += 5.0 * 8.0_f64.powf(size) * deviation_ng * if sign < 0.5 { 1.0 } else { -1.0 };
+                }
             }
         }
         let found = diagnose(&case, &Settings::default()).unwrap();

@@ -101,20 +101,26 @@ pub fn sentence(answer: &Answer) -> String {
     text
 }
 
-/// By how much the residual falls with all that is named: of all, or of those alone that have any of it where others have none.
+/// By how much the residual falls with all that is named, in the middle of those that have any of it; which they are, where others have none.
 fn falls(answer: &Answer) -> String {
     let with: Vec<&ArcAnswer> = answer.arcs.iter().filter(|arc| !arc.effects.is_empty()).collect();
-    let (was, is, whose) = if with.is_empty() || with.len() == answer.arcs.len() {
-        (answer.fit.before.rms_total, answer.fit.after.rms_total, String::new())
+    let [was, is] = if with.is_empty() {
+        [answer.fit.before.rms_total, answer.fit.after.rms_total]
     } else {
-        let [was, is] = [|arc: &ArcAnswer| arc.rms_before, |arc: &ArcAnswer| arc.rms_after]
-            .map(|of| median(with.iter().map(|arc| of(arc))));
-        let ids: Vec<String> = with.iter().map(|arc| arc.id.clone()).collect();
-        let whose = if ids.len() <= 4 { listed(&ids) } else { format!("{} of {}", ids.len(), answer.arcs.len()) };
-        (was, is, format!(" of {whose}"))
+        [|arc: &ArcAnswer| arc.rms_before, |arc: &ArcAnswer| arc.rms_after]
+            .map(|of| median(with.iter().map(|arc| of(arc))))
+    };
+    let whose = match with.len() {
+        all if all == answer.arcs.len() => String::new(),
+        0 => String::new(),
+        few if few <= TOLD => format!(" of {}", with.iter().map(|arc| arc.id.as_str()).collect::<Vec<_>>().join(", ")),
+        many => format!(" of {many} of {}", answer.arcs.len()),
     };
     format!("with it the residual{whose} falls from {} to {} {}", number(was), number(is), answer.unit)
 }
+
+/// Satellites or axes that are told one by one.
+const TOLD: usize = 4;
 
 fn listed(names: &[String]) -> String {
     match names {

@@ -74,7 +74,8 @@ mod tests {
         };
         let in_a_hole = |mut left: Vec<Vector3<f64>>| {
             let mut t_s = t_s.clone();
-            (t_s.drain(50..60), left.drain(50..60));
+            t_s.drain(50..60);
+            left.drain(50..60);
             super::found(&t_s, &left, 0.3)
         };
         assert!(in_a_hole(off(40, 0.0)).is_empty());
