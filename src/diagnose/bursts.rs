@@ -16,6 +16,8 @@ const DEGREES: f64 = 4.0;
 const CONTRADICTED: f64 = 2.5;
 /// Windows for which one out of the ordinary may put others out.
 const REACH: usize = 20;
+/// Stretches of them that are many.
+const MANY: usize = 5;
 /// Looks at what is left, each beside the bursts of the one before: as many of such a stretch are found.
 const LOOKS: usize = 24;
 /// Searches, each beside the bursts of the one before.
@@ -44,7 +46,16 @@ pub fn solve_beside_bursts(
     }
     for _ in 1..ROUNDS {
         let best = solution.best();
-        if !settle(scene, &best.noise, |scene| best.left(scene, &library.entries).whitened) {
+        let whitened = best.left(scene, &library.entries).whitened;
+        let found = if stretches(&out(&whitened)) < MANY {
+            // What goes up and down for a while is one burst from its beginning to its end.
+            (0..3).fold(false, |any, k| {
+                burst_each(&mut scene.loudness[k], &whitened[k], &best.noise[k], &scene.schedule) || any
+            })
+        } else {
+            settle(scene, &best.noise, |scene| best.left(scene, &library.entries).whitened)
+        };
+        if !found {
             break;
         }
         solution = solve_unless(scene, library, null_noise(scene, Some(&solution.null.noise)), stop)?;
@@ -52,17 +63,24 @@ pub fn solve_beside_bursts(
     Some(solution)
 }
 
-/// Whether the best hypothesis explains windows that are out of the ordinary beside nothing, and leaves at least as many.
+/// Whether the best hypothesis explains windows that are out of the ordinary beside nothing, and leaves at least as many, and many at that:
+/// stretches of them, for what goes up and down for an hour is one.
 fn explains_some_of_many(scene: &Scene, library: &Library, solution: &Solution) -> bool {
     let [before, left] = [&solution.null, solution.best()].map(|w| out(&w.left(scene, &library.entries).whitened));
-    let explained = before.iter().filter(|i| !left.contains(i)).count();
-    explained > 0 && left.len() >= explained
+    let explained: Vec<usize> = before.into_iter().filter(|i| !left.contains(i)).collect();
+    let [explained, left] = [explained, left].map(|windows| stretches(&windows));
+    explained > 0 && left >= explained.max(MANY)
 }
 
 /// Windows that are out of the ordinary on any axis.
 fn out(whitened: &Axes) -> Vec<usize> {
     let windows = 0..whitened[0].len();
     windows.filter(|i| whitened.iter().any(|axis| axis[*i].abs() > OUT)).collect()
+}
+
+/// How many stretches of windows that are near to each other.
+fn stretches(windows: &[usize]) -> usize {
+    windows.chunk_by(|a, b| b - a < REACH).count()
 }
 
 /// Gives every window that is out of the ordinary beside nothing its burst; the noise beside them.
@@ -90,8 +108,26 @@ fn settle(scene: &mut Scene, noise: &[AxisNoise; 3], left: impl Fn(&Scene) -> Ax
     true
 }
 
-/// Gives windows their bursts where the whitened residual is out of the ordinary, the first of those near to each other alone, since the
-/// others may be out for its sake; whether there are any new ones.
+/// How much more variance the innovation has that Student's t gives it, over what it has.
+fn more(z: f64) -> f64 {
+    (DEGREES + z * z) / (DEGREES + 1.0) - 1.0
+}
+
+/// Gives every window its burst of samples where the whitened residual is out of the ordinary; whether there is any.
+fn burst_each(loudness: &mut Loudness, whitened: &[f64], noise: &AxisNoise, schedule: &Schedule) -> bool {
+    let out: Vec<usize> = (0..whitened.len()).filter(|i| whitened[*i].abs() > OUT).collect();
+    if out.is_empty() {
+        return false;
+    }
+    let whitener = Whitener::new(noise, schedule, loudness);
+    for i in out {
+        loudness.burst[i] += more(whitened[i]) / whitener.new_share(i, noise, schedule, loudness);
+    }
+    true
+}
+
+/// Gives windows their bursts where the whitened residual is out of the ordinary, but for those that the filter may put out for the sake of one
+/// before; whether there are any new ones.
 ///
 /// A burst is in the samples that are new to a window, and in the next window as much. One that is in a window alone, since the trimmed mean
 /// of the next threw it out, or by another share in the next, is of the window itself: as a burst of samples it would be looked for in the next
@@ -101,9 +137,12 @@ fn weigh_less(loudness: &mut Loudness, whitened: &[f64], noise: &AxisNoise, sche
     let is_out = |i: &usize| whitened[*i].abs() > OUT;
     let mut out: Vec<usize> = Vec::new();
     for i in (0..whitened.len()).filter(is_out) {
-        // A gap ends what a window is out by for the sake of others.
-        let is_near = |before: &usize| i - before < REACH && (before + 1..=i).all(shares);
-        if !out.last().is_some_and(is_near) {
+        // What the filter looks for in vain comes in turns of sign; a gap ends it.
+        let is_echo = |before: &usize| {
+            let turned = if (i - before) % 2 == 0 { 1.0 } else { -1.0 };
+            i - before < REACH && turned * whitened[i] * whitened[*before] > 0.0 && (before + 1..=i).all(shares)
+        };
+        if !out.last().is_some_and(is_echo) {
             out.push(i);
         }
     }
@@ -111,15 +150,14 @@ fn weigh_less(loudness: &mut Loudness, whitened: &[f64], noise: &AxisNoise, sche
         return false;
     }
     let whitener = Whitener::new(noise, schedule, loudness);
+    let was_odd: Vec<bool> = (0..whitened.len()).map(|i| loudness.is_odd(i)).collect();
     for i in out {
         let z = whitened[i];
-        // The variance of the innovation that Student's t gives it.
-        let more = (DEGREES + z * z) / (DEGREES + 1.0) - 1.0;
-        let of_new = more / whitener.new_share(i, noise, schedule, loudness);
+        let of_new = more(z) / whitener.new_share(i, noise, schedule, loudness);
         let own = schedule.shares_of_samples(i)[0].powi(2);
         // The filter expects of the next window what was in this one.
         let contradicted = shares(i + 1) && z * whitened[i + 1] < 0.0 && whitened[i + 1].abs() > CONTRADICTED;
-        let contradicts = shares(i) && loudness.is_odd(i - 1);
+        let contradicts = shares(i) && was_odd[i - 1];
         if contradicts && loudness.burst[i - 1] > 1.0 {
             loudness.alone[i - 1] += schedule.shares_of_samples(i - 1)[0].powi(2) * (loudness.burst[i - 1] - 1.0);
             loudness.burst[i - 1] = 1.0;
