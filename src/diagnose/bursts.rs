@@ -49,9 +49,8 @@ pub fn solve_beside_bursts(
         let whitened = best.left(scene, &library.entries).whitened;
         let found = if stretches(&out(&whitened)) < MANY {
             // What goes up and down for a while is one burst from its beginning to its end.
-            (0..3).fold(false, |any, k| {
-                burst_each(&mut scene.loudness[k], &whitened[k], &best.noise[k], &scene.schedule) || any
-            })
+            let each = |k: usize| burst_each(&mut scene.loudness[k], &whitened[k], &best.noise[k], &scene.schedule);
+            [0, 1, 2].map(each).contains(&true)
         } else {
             settle(scene, &best.noise, |scene| best.left(scene, &library.entries).whitened)
         };
@@ -139,7 +138,7 @@ fn weigh_less(loudness: &mut Loudness, whitened: &[f64], noise: &AxisNoise, sche
     for i in (0..whitened.len()).filter(is_out) {
         // What the filter looks for in vain comes in turns of sign; a gap ends it.
         let is_echo = |before: &usize| {
-            let turned = if (i - before) % 2 == 0 { 1.0 } else { -1.0 };
+            let turned = if (i - before).is_multiple_of(2) { 1.0 } else { -1.0 };
             i - before < REACH && turned * whitened[i] * whitened[*before] > 0.0 && (before + 1..=i).all(shares)
         };
         if !out.last().is_some_and(is_echo) {
