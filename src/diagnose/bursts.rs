@@ -14,9 +14,9 @@ pub const OUT: f64 = 5.0;
 const DEGREES: f64 = 4.0;
 /// Whitened residual of the other sign, of the window after one out of the ordinary, that tells that nothing of that was in it.
 const CONTRADICTED: f64 = 2.5;
-/// Windows for which one out of the ordinary may put others out.
+/// Windows for which one out of the ordinary may put others out: seventeen in the test below.
 const REACH: usize = 20;
-/// Stretches of them that are many.
+/// Stretches of them that are many: fewer may be of one oscillation that dies away.
 const MANY: usize = 5;
 /// Looks at what is left, each beside the bursts of the one before: as many of such a stretch are found.
 const LOOKS: usize = 24;
@@ -100,7 +100,7 @@ fn settle(scene: &mut Scene, noise: &[AxisNoise; 3], left: impl Fn(&Scene) -> Ax
     for look in 0..LOOKS {
         let whitened = left(scene);
         let marked = |k: usize| weigh_less(&mut scene.loudness[k], &whitened[k], &noise[k], &scene.schedule);
-        if !(0..3).map(marked).fold(false, |any, marked| any | marked) {
+        if ![0, 1, 2].map(marked).contains(&true) {
             return look > 0;
         }
     }

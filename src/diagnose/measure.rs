@@ -59,16 +59,23 @@ fn integral_until(grid: &[f64], j: usize, t: f64) -> Weights {
 /// What cubics miss of the integral over a cell, in fourth differences: the next term of the series.
 const NEXT_TERM: f64 = 11.0 / 720.0;
 
+/// Whether the points of a grid are evenly spaced, but for the rounding of a clock.
+pub fn is_even(grid: &[f64]) -> bool {
+    let step = (grid[grid.len() - 1] - grid[0]) / (grid.len() - 1) as f64;
+    grid.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() < 1e-3 * step)
+}
+
+/// The fourth difference of five values.
+pub fn fourth_difference(x: &[f64]) -> f64 {
+    x[0] + x[4] - 4.0 * (x[1] + x[3]) + 6.0 * x[2]
+}
+
 /// What [`Measurement`] misses of a series about each grid point where steps are even; nothing is known of it elsewhere.
 pub fn missed_by_cubics(grid: &[f64], series: &[f64]) -> Vec<f64> {
-    let is_even = |around: &[f64]| {
-        let step = 0.25 * (around[4] - around[0]);
-        around.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() < 1e-3 * step)
-    };
     let mut missed = vec![0.0; series.len()];
     for ((missed, x), grid) in missed.iter_mut().skip(2).zip(series.windows(5)).zip(grid.windows(5)) {
         if is_even(grid) {
-            *missed = NEXT_TERM * (x[0] + x[4] - 4.0 * (x[1] + x[3]) + 6.0 * x[2]);
+            *missed = NEXT_TERM * fourth_difference(x);
         }
     }
     missed

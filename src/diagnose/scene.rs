@@ -390,13 +390,9 @@ fn period_s(r: &Vec3, v: &Vec3) -> f64 {
 /// ends.
 fn gradient(grid: &[f64], values: &[Vec3]) -> Vec<Vec3> {
     let last = grid.len() - 1;
-    let is_even = |around: &[f64]| {
-        let step = (around[around.len() - 1] - around[0]) / (around.len() - 1) as f64;
-        around.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() < 1e-3 * step)
-    };
     let by = |i: usize, weights: &[f64]| {
         let reach = weights.len();
-        let is_inside = i >= reach && i + reach <= last && is_even(&grid[i - reach..=i + reach]);
+        let is_inside = i >= reach && i + reach <= last && measure::is_even(&grid[i - reach..=i + reach]);
         let sum = || weights.iter().zip(1..).map(|(weight, n)| (values[i + n] - values[i - n]) * *weight).sum::<Vec3>();
         is_inside.then(|| sum() * (2 * reach) as f64 / (grid[i + reach] - grid[i - reach]))
     };

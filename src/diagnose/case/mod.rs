@@ -19,6 +19,7 @@ pub use motion::unresolved;
 pub use spikes::SPIKE;
 
 use super::error::CaseError;
+use super::measure::{fourth_difference, is_even};
 use crate::math::shared_work;
 use crate::pipeline::calibration::AnomalyKind;
 
@@ -399,13 +400,8 @@ fn missed(grid: &[f64], series: &[f64], i: usize) -> f64 {
         return 0.0;
     }
     let [before, after] = [grid[i] - grid[i - 1], grid[i + 1] - grid[i]];
-    let is_even = |step: f64| (step - before).abs() < 1e-3 * before;
-    if i > 1
-        && i + 2 < grid.len()
-        && [grid[i - 1] - grid[i - 2], after, grid[i + 2] - grid[i + 1]].into_iter().all(is_even)
-    {
-        let around = series[i - 2] + series[i + 2] - 4.0 * (series[i - 1] + series[i + 1]);
-        return (around + 6.0 * series[i]).abs() / 24.0;
+    if i > 1 && i + 2 < grid.len() && is_even(&grid[i - 2..i + 3]) {
+        return fourth_difference(&series[i - 2..i + 3]).abs() / 24.0;
     }
     let straight = (series[i - 1] * after + series[i + 1] * before) / (before + after);
     (series[i] - straight).abs() * before.max(after).powi(2) / (4.0 * before * after)

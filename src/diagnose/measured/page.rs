@@ -101,6 +101,9 @@ pub fn sentence(answer: &Answer) -> String {
     text
 }
 
+/// Satellites or axes that are told one by one.
+const TOLD: usize = 4;
+
 /// By how much the residual falls with all that is named, in the middle of those that have any of it; which they are, where others have none.
 fn falls(answer: &Answer) -> String {
     let with: Vec<&ArcAnswer> = answer.arcs.iter().filter(|arc| !arc.effects.is_empty()).collect();
@@ -111,16 +114,12 @@ fn falls(answer: &Answer) -> String {
             .map(|of| median(with.iter().map(|arc| of(arc))))
     };
     let whose = match with.len() {
-        all if all == answer.arcs.len() => String::new(),
-        0 => String::new(),
+        all if all == 0 || all == answer.arcs.len() => String::new(),
         few if few <= TOLD => format!(" of {}", with.iter().map(|arc| arc.id.as_str()).collect::<Vec<_>>().join(", ")),
         many => format!(" of {many} of {}", answer.arcs.len()),
     };
     format!("with it the residual{whose} falls from {} to {} {}", number(was), number(is), answer.unit)
 }
-
-/// Satellites or axes that are told one by one.
-const TOLD: usize = 4;
 
 fn listed(names: &[String]) -> String {
     match names {

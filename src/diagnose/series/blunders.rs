@@ -20,7 +20,6 @@ const LARGEST: f64 = 1e15;
 /// Takes the cells that are no measurement out of a column, in order of time; a cell without a number has none (`NaN`). Which they were.
 pub fn taken_out(column: &mut [f64]) -> Vec<usize> {
     let mut out = stand_ins(column);
-    out.iter().for_each(|i| column[*i] = f64::NAN);
     let spikes = spikes(column);
     spikes.iter().for_each(|i| column[*i] = f64::NAN);
     out.extend(spikes);
@@ -38,24 +37,28 @@ fn stands_for_none(value: f64) -> bool {
         || (digits.len() >= 3 && digits.bytes().all(|c| c == b'9'))
 }
 
-/// Cells that have such a number, where it is far from all others.
-fn stand_ins(column: &[f64]) -> Vec<usize> {
-    let mut out: Vec<usize> = Vec::new();
+/// Takes out the cells that have such a number, where it is far from all others. Which they were.
+fn stand_ins(column: &mut [f64]) -> Vec<usize> {
+    let mut out = Vec::new();
     for _ in 0..STAND_INS {
-        let left = || (0..column.len()).filter(|i| column[*i].is_finite() && !out.contains(i));
-        let ends =
-            left().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], i| [low.min(column[i]), high.max(column[i])]);
+        let ends = ends(column.iter().copied());
         let is_one = |end: &f64| {
-            let others = left().map(|i| column[i]).filter(|x| x != end);
-            let [low, high] =
-                others.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+            let [low, high] = self::ends(column.iter().copied().filter(|x| x != end));
             stands_for_none(*end) && high >= low && (end - low).abs().min((end - high).abs()) > AWAY * (high - low)
         };
         let Some(end) = ends.into_iter().find(is_one) else { break };
-        let more: Vec<usize> = left().filter(|i| column[*i] == end).collect();
-        out.extend(more);
+        for (i, x) in column.iter_mut().enumerate().filter(|(_, x)| **x == end) {
+            *x = f64::NAN;
+            out.push(i);
+        }
     }
     out
+}
+
+/// The lowest and the highest of the numbers among values.
+fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let numbers = values.filter(|x| x.is_finite());
+    numbers.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }
 
 /// Cells that are far from those about them, one or two in a row (Hampel 1974).

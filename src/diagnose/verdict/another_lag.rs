@@ -8,7 +8,7 @@ use crate::diagnose::search::Set;
 use crate::diagnose::solve::Library;
 use crate::math::shared_work;
 
-/// Standard errors from the lag found from which on another is another, and s at least.
+/// Standard errors from the lag found from which on another is another, and at least a quarter of an orbit, s: nearer is the same peak.
 const APART: f64 = 3.0;
 const APART_S: f64 = 1500.0;
 /// Log odds, of twenty, by which another lag must be the less likely to go without a word.
@@ -33,8 +33,8 @@ pub fn of_another_lag(scene: &Scene, library: &Library, frame: &Frame, set: &Set
     let less = set.chosen(frame).log_evidence - likeliest;
     (less < ODDS).then(|| {
         format!(
-            "temperature_bias: a lag of some {lag_s:.0} s fits as well (log odds of {:.1} against it), and the error of lag_s knows nothing \
-             of it: a temperature that swings with the orbit tells a lag but for whole turns",
+            "temperature_bias: a lag of some {lag_s:.0} s fits as well (log odds of {:.1} against it), and the error of lag_s is that of the \
+             one named alone",
             less.max(0.0)
         )
     })
