@@ -4,6 +4,7 @@ mod made;
 mod malformed;
 mod orbits;
 mod pad;
+mod pushes;
 mod sensors;
 
 use std::collections::BTreeMap;

@@ -68,6 +68,7 @@ fn orbits(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Vec<S
             baseline: full.clone(),
             arcs: vec![arc.clone()],
             sigma_m: all.sigma_m,
+            stated_sigma_m: all.stated_sigma_m,
             left_out: Vec::new(),
         };
         let level = problem.fit(&full, Vec::new(), None);
@@ -158,14 +159,16 @@ fn orbit_said(problem: &Problem, degree_left: usize, removed: &str) -> Said {
     if removed == "gravity_degree" {
         baseline.degree = degree_left;
     }
-    let reduced = Problem {
+    let mut reduced = Problem {
         environment: problem.environment.clone(),
         baseline,
         arcs: problem.arcs.clone(),
         sigma_m: problem.sigma_m,
+        stated_sigma_m: problem.stated_sigma_m,
         left_out: Vec::new(),
     };
-    let answer = report::answer("", &reduced, &reduced.search(&mut |_| ()));
+    let search = orbit::searched(&mut reduced);
+    let answer = report::answer("", &reduced, &search);
     let arc = &answer.arcs[0];
     Said {
         named: answer.effects.iter().map(|e| e.id.clone()).collect(),

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 use super::OrbitError;
 use super::forces::{Baseline, Environment, Moment, Term, sunlit};
 use super::sp3::Track;
+use crate::diagnose::measured::spread::median;
 use crate::physics::earth_orientation::lagrange_weights;
 use crate::physics::integrator::{Collocation, State, Step};
 
@@ -71,8 +72,8 @@ pub struct ArcFit {
     pub partials: DMatrix<f64>,
     /// The term each further column belongs to, scaled by [`Term::scale`].
     pub columns: Vec<(Term, usize)>,
-    /// A velocity step in the model; its four columns (three of velocity, one of its instant) stand after all others.
-    pub impulse: Option<Impulse>,
+    /// Velocity steps in the model, in order of time; the four columns of each (three of velocity, one of its instant) stand after all others.
+    pub impulses: Vec<Impulse>,
     /// State at each epoch against the state at the first.
     pub transitions: Vec<Matrix6<f64>>,
 }
@@ -108,6 +109,11 @@ impl Arc {
     pub fn height_min_m(&self) -> f64 {
         let lowest = self.observed_m.iter().map(|r| r.norm()).fold(f64::INFINITY, f64::min);
         lowest - crate::physics::third_body::EARTH_RADIUS_M
+    }
+
+    /// Height over the equatorial radius that half of the positions are above, m.
+    pub fn height_median_m(&self) -> f64 {
+        median(self.observed_m.iter().map(|r| r.norm())) - crate::physics::third_body::EARTH_RADIUS_M
     }
 
     /// Fit the state and the coefficients of `active` (and the velocity step of `from`, where it has one), and give partials
@@ -181,7 +187,7 @@ impl Arc {
             residuals_m: Vec::new(),
             partials: DMatrix::zeros(0, 0),
             columns: active.iter().chain(others).flat_map(of).collect(),
-            impulse: from.and_then(|fit| fit.impulse),
+            impulses: from.map_or_else(Vec::new, |fit| fit.impulses.clone()),
             transitions: Vec::new(),
         }
     }
@@ -196,17 +202,20 @@ impl Arc {
                 next += 1;
             }
         }
-        if let Some(impulse) = &mut fit.impulse {
+        let (first, last) = (self.t_s[1], self.t_s[self.fitted - 2]);
+        for impulse in &mut fit.impulses {
             impulse.dv_m_s += Vector3::new(step[next], step[next + 1], step[next + 2]);
-            let (first, last) = (self.t_s[1], self.t_s[self.fitted - 2]);
             impulse.at_s = (impulse.at_s + step[next + 3].clamp(-7_200.0, 7_200.0)).clamp(first, last);
+            next += 4;
         }
+        fit.impulses.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     }
 
     /// Integrate over the first epochs, filling residuals and partials.
     fn propagate(&self, environment: &Environment, baseline: &Baseline, fit: &mut ArcFit, epochs: usize) {
         let flight = Flight { environment, baseline, gauss: Collocation::gauss(STAGES) };
-        let columns = 6 + fit.columns.len() + if fit.impulse.is_some() { 4 } else { 0 };
+        let columns = 6 + fit.columns.len() + 4 * fit.impulses.len();
+        let impulses = fit.impulses.clone();
         let zero = State { r: Vector3::zeros(), v: Vector3::zeros() };
         let mut carried = vec![zero; columns];
         for axis in 0..3 {
@@ -218,9 +227,11 @@ impl Arc {
         fit.transitions = Vec::with_capacity(epochs);
         let (mut state, mut t) = (fit.start, self.t_s[0]);
         for (i, &epoch) in self.t_s[..epochs].iter().enumerate() {
-            if let Some(impulse) = fit.impulse.filter(|impulse| impulse.at_s > t && impulse.at_s <= epoch) {
+            let begun = t;
+            for (k, impulse) in impulses.iter().enumerate().filter(|(_, one)| one.at_s > begun && one.at_s <= epoch) {
                 state = self.advance(&flight, (t, impulse.at_s), state, fit, &mut carried);
-                kick(&impulse, &mut state, &mut carried);
+                let first = carried.len() - 4 * (impulses.len() - k);
+                kick(impulse, &mut state, &mut carried[first..first + 4]);
                 t = impulse.at_s;
             }
             state = self.advance(&flight, (t, epoch), state, fit, &mut carried);
@@ -253,14 +264,13 @@ impl Arc {
     }
 }
 
-/// A velocity step, and what it does to the columns: later by dt, it leaves the satellite `dv dt` behind.
+/// A velocity step, and what it does to its columns: later by dt, it leaves the satellite `dv dt` behind.
 fn kick(impulse: &Impulse, state: &mut State, carried: &mut [State]) {
     state.v += impulse.dv_m_s;
-    let first = carried.len() - 4;
     for axis in 0..3 {
-        carried[first + axis].v[axis] = 1.0;
+        carried[axis].v[axis] = 1.0;
     }
-    carried[first + 3].r = -impulse.dv_m_s;
+    carried[3].r = -impulse.dv_m_s;
 }
 
 /// Positions and velocities of a satellite that starts in `start` at the first of `t_s` and feels a baseline and further
@@ -280,7 +290,7 @@ pub fn fly(
         residuals_m: Vec::new(),
         partials: DMatrix::zeros(0, 0),
         columns: Vec::new(),
-        impulse: None,
+        impulses: Vec::new(),
         transitions: Vec::new(),
     };
     let rate = (environment.field.gm_m3_s2() / start.r.norm().powi(3)).sqrt();
@@ -318,16 +328,19 @@ impl ArcFit {
         if rms.is_nan() { f64::INFINITY } else { rms }
     }
 
-    /// Places in `partials` of the columns of all that was fitted, but for terms that `keep` leaves out: the state, the velocity step, the
+    /// Places in `partials` of the columns of all that was fitted, but for terms that `keep` leaves out: the state, the velocity steps, the
     /// coefficients.
     pub(super) fn fitted_columns(&self, keep: impl Fn(Term) -> bool) -> Vec<usize> {
         let active: usize = self.coefficients.iter().map(|(term, _)| term.parameters().len()).sum();
         let mut used: Vec<usize> = (0..6).collect();
-        if self.impulse.is_some() {
-            used.extend(self.partials.ncols() - 4..self.partials.ncols());
-        }
+        used.extend(self.partials.ncols() - 4 * self.impulses.len()..self.partials.ncols());
         used.extend((0..active).filter(|j| keep(self.columns[*j].0)).map(|j| 6 + j));
         used
+    }
+
+    /// How many numbers were fitted.
+    pub fn unknowns(&self) -> usize {
+        self.fitted_columns(|_| true).len()
     }
 
     /// Coefficients of a fitted term.

@@ -1,4 +1,5 @@
-//! Single positions that the fitted orbit and their neighbours contradict. Beside an orbit what is left is smooth, whatever the model
+//! What the positions themselves say of their error: how much they scatter from one to the next, and which single ones the fitted orbit and
+//! their neighbours contradict. Beside an orbit what is left is smooth, whatever the model
 //! lacks, so that decimetres show which the positions themselves hide between a quarter of an hour and the next.
 
 use nalgebra::Vector3;
@@ -17,17 +18,60 @@ const NEAR_STEPS: f64 = 5.5;
 /// Error of what an epoch is off the polynomial through four even neighbours on either side, over that of a position.
 const IN_THE_MIDDLE: f64 = 1.63;
 
-/// Leaves blunders out of all arcs, and counts them as masked.
+/// Times the stated accuracy from which on the scatter that positions show is believed instead.
+const BELIEVED: f64 = 1.5;
+/// White noise scatters about polynomials through six neighbours and through eight by the same error, but for this factor; what is smooth does
+/// not.
+const ALIKE: f64 = 1.2;
+/// Median length of a vector of three normal deviates.
+const MEDIAN_LENGTH: f64 = 1.538;
+
+/// Takes the positions' own scatter for their accuracy where it is more than stated, and leaves blunders out of all arcs, counted as masked.
 pub fn leave_out(problem: &mut Problem) {
     let model = fullest();
+    let fit = |problem: &Problem, i: usize| {
+        problem.arcs[i].fit(&problem.environment, &model, &model.estimated, &[], None).residuals_m
+    };
+    let left: Vec<Vec<Vector3<f64>>> = (0..problem.arcs.len()).map(|i| fit(problem, i)).collect();
+    let of_arcs = problem.arcs.iter().zip(&left).map(|(arc, left)| (arc.t_s.as_slice(), left.as_slice()));
+    if let Some(sigma_m) = scatter_m(of_arcs).filter(|sigma_m| *sigma_m > BELIEVED * problem.sigma_m) {
+        problem.sigma_m = sigma_m;
+    }
     let least_m = TIMES * 3f64.sqrt() * problem.sigma_m;
-    for i in 0..problem.arcs.len() {
-        let fit = problem.arcs[i].fit(&problem.environment, &model, &model.estimated, &[], None);
-        let out = found(&problem.arcs[i].t_s, &fit.residuals_m, least_m);
+    for (i, left) in left.iter().enumerate() {
+        let out = found(&problem.arcs[i].t_s, left, least_m);
         if !out.is_empty() {
             problem.arcs[i].leave_out(&out);
         }
     }
+}
+
+/// Error of a coordinate by what positions are off the polynomials through their neighbours, m; none where that is not noise, or there are
+/// too few.
+fn scatter_m<'a>(arcs: impl Iterator<Item = (&'a [f64], &'a [Vector3<f64>])>) -> Option<f64> {
+    const FEWEST: usize = 60;
+    let mut misses: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
+    for (t_s, left_m) in arcs {
+        let usual_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]));
+        for i in SIDE..left_m.len().saturating_sub(SIDE) {
+            let is_even = (1..=SIDE).all(|k| {
+                [t_s[i + k] - t_s[i], t_s[i] - t_s[i - k]].iter().all(|s| (s - k as f64 * usual_s).abs() < 0.5)
+            });
+            for (side, misses) in [SIDE - 1, SIDE].into_iter().zip(&mut misses).filter(|_| is_even) {
+                let near: Vec<usize> = (i - side..=i + side).filter(|j| *j != i).collect();
+                let nodes: Vec<f64> = near.iter().map(|j| t_s[*j] - t_s[i]).collect();
+                let weights = lagrange_weights(&nodes, 0.0);
+                let through: Vector3<f64> = near.iter().zip(&weights).map(|(j, w)| left_m[*j] * *w).sum();
+                let error = (1.0 + weights.iter().map(|w| w * w).sum::<f64>()).sqrt();
+                misses.push((through - left_m[i]).norm() / error / MEDIAN_LENGTH);
+            }
+        }
+    }
+    if misses[0].len() < FEWEST {
+        return None;
+    }
+    let [fewer, more] = misses.map(median);
+    (fewer < ALIKE * more && more < ALIKE * fewer).then_some(more)
 }
 
 /// Epochs of what is left of an arc that are off by more than so much, each alone: without it nothing about it is. A step of velocity is a
@@ -63,6 +107,24 @@ fn miss(t_s: &[f64], left_m: &[Vector3<f64>], (i, without): (usize, Option<usize
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Noise is found beside what comes and goes in hours; that alone is none.
+    #[test]
+    fn scatter_is_that_of_the_noise_and_what_is_smooth_has_none() {
+        use rand::{RngExt, SeedableRng};
+        let mut rng = rand_chacha::ChaCha12Rng::seed_from_u64(11);
+        let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+        let t_s: Vec<f64> = (0..192).map(|i| 900.0 * f64::from(i)).collect();
+        let smooth = |t: f64, m: f64| Vector3::new((t / 6800.0).sin(), (t / 9000.0).cos(), 0.0) * m;
+        let mut made = |sigma_m: f64, m: f64| -> Vec<Vector3<f64>> {
+            t_s.iter().map(|t| smooth(*t, m) + Vector3::new(normal(), normal(), normal()) * sigma_m).collect()
+        };
+        let noisy = made(0.1, 3.0);
+        let found = scatter_m(std::iter::once((t_s.as_slice(), noisy.as_slice()))).expect("white");
+        assert!((found / 0.1 - 1.0).abs() < 0.15, "{found}");
+        let bare = made(0.0, 3.0);
+        assert_eq!(scatter_m(std::iter::once((t_s.as_slice(), bare.as_slice()))), None);
+    }
 
     /// What is left of a missing pull, metres that come and go, with one position off by half a metre; and a bend.
     #[test]

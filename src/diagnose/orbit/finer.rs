@@ -5,9 +5,9 @@
 //! Both are in unless the recording is better without: beside the fullest model of everything else, or, where radiation or air was named,
 //! by a second search that needs less of those. The second look doubles the time of such a case.
 
-use super::arc::{Arc, ArcFit};
+use super::compare::{self, Left, asked_for};
 use super::forces::{Baseline, Finer, Term};
-use super::search::{Problem, SCORE_ARC_MAX, SCORE_MIN, Search, independent, residual};
+use super::search::{Problem, SCORE_MIN, Search};
 
 /// Arcs that are asked first.
 const ARCS_MAX: usize = 6;
@@ -24,7 +24,7 @@ pub fn settled(problem: &mut Problem) -> Search {
     }
     problem.environment.finer = NEITHER;
     let other = problem.search(&mut |_| ());
-    if is_better(problem, &other, &search) {
+    if compare::evidence_over(problem, &other.end().fits, &search.end().fits) > SCORE_MIN {
         return other;
     }
     problem.environment.finer = Finer::ALL;
@@ -33,32 +33,12 @@ pub fn settled(problem: &mut Problem) -> Search {
 
 const NEITHER: Finer = Finer { tide: false, relativity: false };
 
-/// Whether one explanation has more evidence than another, its numbers counted.
-fn is_better(problem: &Problem, one: &Search, other: &Search) -> bool {
-    let kept = |search: &Search| -> Vec<(Left, f64)> {
-        let end = search.end();
-        let left = |(arc, fit)| (Left::of(problem, arc, fit), fit.coefficients.len() as f64);
-        problem.arcs.iter().zip(&end.fits).map(left).collect()
-    };
-    let (one, other) = (kept(one), kept(other));
-    let score = |((one, less), (other, more)): (&(Left, f64), &(Left, f64))| {
-        one.evidence_over(other) + (more - less) * one.independent.ln()
-    };
-    asked_for(one.iter().zip(&other).map(score).collect()) > SCORE_MIN
-}
-
-/// What all arcs ask for together, one of them so much at most; nothing where most do not.
-fn asked_for(each: Vec<f64>) -> f64 {
-    let wanting = each.iter().filter(|score| **score > 0.0).count();
-    if 2 * wanting > each.len() { each.iter().map(|score| score.min(SCORE_ARC_MAX)).sum() } else { 0.0 }
-}
-
 /// The finer terms of a recording beside the fullest model of everything else.
 fn beside_everything(problem: &mut Problem) -> Finer {
     let with = left(problem, Finer::ALL);
     let mut score = |finer: Finer| {
         let without = left(problem, finer);
-        asked_for(without.iter().zip(&with).map(|(without, with)| without.evidence_over(with)).collect())
+        asked_for(without.iter().zip(&with).map(|(without, with)| without.squares_over(with)).collect())
     };
     let neither = score(NEITHER);
     if neither <= SCORE_MIN {
@@ -74,25 +54,6 @@ fn beside_everything(problem: &mut Problem) -> Finer {
 pub(super) fn fullest() -> Baseline {
     let radiation = [Term::SolarRadiation, Term::YBias, Term::BBias, Term::OncePerRev];
     Baseline { degree: usize::MAX, known: vec![Term::Sun, Term::Moon], estimated: radiation.to_vec() }
-}
-
-/// What an arc keeps.
-struct Left {
-    squares: f64,
-    independent: f64,
-}
-
-impl Left {
-    fn of(problem: &Problem, arc: &Arc, fit: &ArcFit) -> Self {
-        let left = residual(arc, fit);
-        // Below its accuracy a recording tells nothing.
-        let floor = left.len() as f64 * problem.sigma_m.powi(2);
-        Self { squares: left.norm_squared().max(floor), independent: independent(&left, 6 + fit.coefficients.len()) }
-    }
-
-    fn evidence_over(&self, other: &Self) -> f64 {
-        self.independent * (other.squares / self.squares).ln()
-    }
 }
 
 fn left(problem: &mut Problem, finer: Finer) -> Vec<Left> {

@@ -28,6 +28,32 @@ pub struct Environment {
     pub field: GravityField,
     /// What else acts.
     pub finer: Finer,
+    /// How thin the air becomes with height.
+    pub air: Air,
+}
+
+/// An exponential atmosphere about a height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Air {
+    /// Where the density is that of the mean one, m.
+    pub height_m: f64,
+    /// In which it falls to 1/e, m.
+    pub scale_height_m: f64,
+}
+
+impl Air {
+    /// 3.2e-12 kg/m^3 at 400 km, scale height 60 km: mean Sun.
+    pub const MEAN: Self = Self { height_m: 400e3, scale_height_m: 60e3 };
+
+    /// The density of the mean atmosphere at a height, and another scale height about it.
+    pub fn about(height_m: f64, scale_height_m: f64) -> Self {
+        Self { height_m, scale_height_m }
+    }
+
+    fn density_kg_m3(&self, height_m: f64) -> f64 {
+        let there = 3.2e-12 * (-(self.height_m - Self::MEAN.height_m) / Self::MEAN.scale_height_m).exp();
+        there * (-(height_m - self.height_m) / self.scale_height_m).exp()
+    }
 }
 
 /// Which finer terms act.
@@ -53,7 +79,7 @@ impl Environment {
         field: GravityField,
     ) -> Result<Self, EarthOrientationError> {
         let rotation = Rotation::new(eop, origin, span_s)?;
-        Ok(Self { rotation, bodies: SunMoonTable::new(origin, span_s), field, finer: Finer::ALL })
+        Ok(Self { rotation, bodies: SunMoonTable::new(origin, span_s), field, finer: Finer::ALL, air: Air::MEAN })
     }
 }
 
@@ -76,6 +102,54 @@ pub enum Term {
     OncePerRev,
     /// Air drag, for orbits low enough to have air.
     Drag,
+    /// A push that no catalogue has, which is never named: it shows what a name is worth.
+    Unlisted(Unlisted),
+}
+
+/// Accelerations that stand for no physics in particular.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Unlisted {
+    /// A constant in one direction of the orbit's own frame.
+    Steady(Direction),
+    /// The cosine and the sine of the argument of latitude in one.
+    PerRevolution(Direction),
+    /// The pull of the Sun taken away, from a simulation that has it and a recording that has not.
+    NoSun,
+    /// That of the Moon.
+    NoMoon,
+    /// These degrees of the field taken away, the first and the last.
+    NoDegrees(usize, usize),
+}
+
+/// Along the radius, the track, or the orbit's normal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Direction {
+    /// Away from the Earth's centre.
+    Radial,
+    /// Square to the radius in the orbit's plane, ahead.
+    Along,
+    /// Along the orbit's normal.
+    Cross,
+}
+
+impl Direction {
+    /// All three.
+    pub const ALL: [Self; 3] = [Self::Radial, Self::Along, Self::Cross];
+
+    /// The word in answers.
+    pub fn name(self) -> &'static str {
+        ["radial", "along", "cross"][self as usize]
+    }
+
+    fn unit(self, state: &State) -> Vector3<f64> {
+        let radial = state.r.normalize();
+        let normal = state.r.cross(&state.v).normalize();
+        match self {
+            Self::Radial => radial,
+            Self::Along => normal.cross(&radial),
+            Self::Cross => normal,
+        }
+    }
 }
 
 impl Term {
@@ -90,6 +164,7 @@ impl Term {
             Self::BBias => "srp_b_bias",
             Self::OncePerRev => "srp_once_per_rev",
             Self::Drag => "aerodynamic_drag",
+            Self::Unlisted(_) => "unlisted",
         }
     }
 
@@ -104,6 +179,7 @@ impl Term {
             Self::BBias => "Constant along B, across the panels' axis and the Sun's direction",
             Self::OncePerRev => "Once-per-revolution push along B",
             Self::Drag => "Aerodynamic drag",
+            Self::Unlisted(_) => "A push that no catalogue has",
         }
     }
 
@@ -111,8 +187,9 @@ impl Term {
     pub fn parameters(self) -> &'static [&'static str] {
         match self {
             Self::Sun | Self::Moon | Self::DegreesFrom(_) | Self::Drag => &["fraction"],
-            Self::SolarRadiation | Self::YBias | Self::BBias => &["accel_m_s2"],
-            Self::OncePerRev => &["cos_m_s2", "sin_m_s2"],
+            Self::SolarRadiation | Self::YBias | Self::BBias | Self::Unlisted(Unlisted::Steady(_)) => &["accel_m_s2"],
+            Self::OncePerRev | Self::Unlisted(Unlisted::PerRevolution(_)) => &["cos_m_s2", "sin_m_s2"],
+            Self::Unlisted(_) => &["fraction"],
         }
     }
 
@@ -123,15 +200,17 @@ impl Term {
 
     /// Whether physics fixes the coefficient beforehand: then it must come out as one.
     pub fn is_known_size(self) -> bool {
-        matches!(self, Self::Sun | Self::Moon | Self::DegreesFrom(_))
+        use Unlisted::{NoDegrees, NoMoon, NoSun};
+        matches!(self, Self::Sun | Self::Moon | Self::DegreesFrom(_) | Self::Unlisted(NoSun | NoMoon | NoDegrees(..)))
     }
 
     /// A typical coefficient, to make columns comparable in size.
     pub fn scale(self) -> f64 {
         match self {
-            Self::Sun | Self::Moon | Self::DegreesFrom(_) | Self::Drag => 1.0,
             Self::SolarRadiation => 1e-7,
             Self::YBias | Self::BBias | Self::OncePerRev => 1e-9,
+            Self::Unlisted(Unlisted::Steady(_) | Unlisted::PerRevolution(_)) => 1e-9,
+            Self::Sun | Self::Moon | Self::DegreesFrom(_) | Self::Drag | Self::Unlisted(_) => 1.0,
         }
     }
 }
@@ -198,7 +277,26 @@ impl Moment {
                 let (sin, cos) = self.argument_of_latitude().sin_cos();
                 [b * cos * self.sunlit, b * sin * self.sunlit]
             }
-            Term::Drag => [self.drag(), zero],
+            Term::Drag => [self.drag(environment.air), zero],
+            Term::Unlisted(unlisted) => self.unlisted(environment, unlisted),
+        }
+    }
+
+    fn unlisted(&self, environment: &Environment, unlisted: Unlisted) -> [Vector3<f64>; 2] {
+        let taken_away = |term: Term| [-self.columns(environment, term)[0], Vector3::zeros()];
+        match unlisted {
+            Unlisted::Steady(direction) => [direction.unit(&self.state), Vector3::zeros()],
+            Unlisted::PerRevolution(direction) => {
+                let (sin, cos) = self.argument_of_latitude().sin_cos();
+                let unit = direction.unit(&self.state);
+                [unit * cos, unit * sin]
+            }
+            Unlisted::NoSun => taken_away(Term::Sun),
+            Unlisted::NoMoon => taken_away(Term::Moon),
+            Unlisted::NoDegrees(from, to) => {
+                let fixed = environment.field.acceleration_of_degrees(&(self.rotation * self.state.r), from, to);
+                [-self.rotation.tr_mul(&fixed), Vector3::zeros()]
+            }
         }
     }
 
@@ -217,12 +315,12 @@ impl Moment {
         self.state.r.dot(&normal.cross(&node)).atan2(self.state.r.dot(&node))
     }
 
-    /// Drag of a satellite of 0.01 m^2/kg and coefficient 2.2 in an exponential atmosphere: 3.2e-12 kg/m^3 at 400 km,
-    /// scale height 60 km (mean Sun). The form is what is looked for; the fraction carries what is not known.
-    fn drag(&self) -> Vector3<f64> {
+    /// Drag of a satellite of 0.01 m^2/kg and coefficient 2.2 in an exponential atmosphere. The form is what is looked for; the fraction
+    /// carries what is not known.
+    fn drag(&self, air: Air) -> Vector3<f64> {
         let wind = self.state.v - self.pole().cross(&self.state.r) * EARTH_RATE_RAD_S;
         let height_m = self.state.r.norm() - EARTH_RADIUS_M;
-        let density = 3.2e-12 * (-(height_m - 400e3) / 60e3).exp();
+        let density = air.density_kg_m3(height_m);
         wind * (-0.5 * density * 2.2 * 0.01 * wind.norm())
     }
 }

@@ -11,7 +11,7 @@ fn second_half_predicted_m(arc: &Arc, fit: &ArcFit) -> Option<f64> {
     let (first, last) = (arc.t_s[0], arc.t_s[arc.fitted - 1]);
     let middle = 0.5 * (first + last);
     let half = arc.t_s[..arc.fitted].partition_point(|t| *t <= middle);
-    if half < EPOCHS_MIN || arc.fitted - half < EPOCHS_MIN || fit.impulse.is_some_and(|kick| kick.at_s > middle) {
+    if half < EPOCHS_MIN || arc.fitted - half < EPOCHS_MIN || fit.impulses.iter().any(|kick| kick.at_s > middle) {
         return None;
     }
     let (seen, unseen) = (3 * half, 3 * (arc.fitted - half));

@@ -1,4 +1,4 @@
-//! A velocity step of one satellite: looked for at every epoch by the columns it would have, then fitted with its instant.
+//! Velocity steps of one satellite, one or two: looked for at every epoch by the columns they would have, then fitted with their instants.
 //!
 //! It belongs to one arc and is no common cause. It is claimed only where it leaves what the stated accuracy allows, and is
 //! larger than what an unlisted push gains over the arc, or leaves nothing else: four free numbers take something off any odd arc. Not here: terms that push all the time (`search`).
@@ -20,6 +20,16 @@ const UNLISTED_TIMES: f64 = 10.0;
 /// One that is smaller must leave the stated accuracy, but for this factor, and less than this part of the rms.
 const CLEAN: f64 = 1.5;
 const CLEAN_LEFT: f64 = 0.05;
+/// Most steps that one arc can have.
+const STEPS_MAX: usize = 2;
+/// Places from which two are looked for.
+const FIRST_PLACES: usize = 12;
+/// Epochs by which two are apart at least.
+const APART_EPOCHS: usize = 2;
+/// Rounds in which each of two instants is looked for again beside the other.
+const ROUNDS_MAX: usize = 6;
+/// Two that leave less than this part of the squares say where an arc is odd.
+const TOLD: f64 = 0.04;
 /// Unknowns of a velocity step.
 const UNKNOWNS: f64 = 4.0;
 
@@ -40,6 +50,8 @@ pub struct Manoeuvre {
     pub score: f64,
     /// 3-D rms of the arc without it and with it, m.
     pub rms_m: [f64; 2],
+    /// Whether the arc has another, which is in both of these.
+    pub of_two: bool,
 }
 
 /// The level with velocity steps in the arcs that ask for one beyond what the best common term gives them (`rivals`: rms
@@ -50,19 +62,13 @@ pub fn step(problem: &Problem, level: &Level, rivals: &[f64]) -> Option<Level> {
     for (i, arc) in problem.arcs.iter().enumerate() {
         let fit = &level.fits[i];
         let was = fit.rms_m(0..arc.fitted);
-        if fit.impulse.is_some() || was <= problem.rms_max_m() || rivals[i] <= problem.rms_max_m() {
+        if !fit.impulses.is_empty() || was <= problem.rms_max_m() || rivals[i] <= problem.rms_max_m() {
             continue;
         }
-        let Some(tried) = fitted(problem, level, i) else { continue };
-        let is = tried.rms_m(0..arc.fitted);
-        let small = tried.impulse.is_none_or(|impulse| impulse.dv_m_s.norm() < least_m_s(arc));
-        // What leaves nothing but the stated error of so much more is no push that lasts, however small.
-        let clean = is <= CLEAN * 3f64.sqrt() * problem.sigma_m && is < CLEAN_LEFT * was;
-        if (small && !clean) || is > LEFT_MAX * was {
-            continue;
-        }
-        let enough = is <= problem.rms_max_m() || (is < PROVISIONAL * was && is < PROVISIONAL * rivals[i]);
-        if enough && score(arc, &tried, [was, is]) > SCORE_MIN {
+        let believed = |count: usize| {
+            fitted(problem, level, i, count).filter(|tried| believe(problem, arc, tried, [was, rivals[i]]))
+        };
+        if let Some(tried) = (1..=STEPS_MAX).find_map(believed) {
             next.fits[i] = tried;
             any = true;
         }
@@ -70,18 +76,32 @@ pub fn step(problem: &Problem, level: &Level, rivals: &[f64]) -> Option<Level> {
     any.then_some(next)
 }
 
+/// Whether velocity steps explain an arc that kept so much, and would with the best common term.
+fn believe(problem: &Problem, arc: &Arc, tried: &ArcFit, [was, rival]: [f64; 2]) -> bool {
+    let is = tried.rms_m(0..arc.fitted);
+    let small = tried.impulses.iter().any(|impulse| impulse.dv_m_s.norm() < least_m_s(arc));
+    // What leaves nothing but the stated error of so much more is no push that lasts, however small.
+    let clean = is <= CLEAN * 3f64.sqrt() * problem.sigma_m && is < CLEAN_LEFT * was;
+    if (small && !clean) || is > LEFT_MAX * was {
+        return false;
+    }
+    // Two take much from anything: there they must leave what the stated accuracy allows.
+    let provisional = tried.impulses.len() == 1 && is < PROVISIONAL * was && is < PROVISIONAL * rival;
+    (is <= problem.rms_max_m() || provisional) && score(arc, tried, tried.impulses.len(), [was, is]) > SCORE_MIN
+}
+
 /// Take out the velocity steps that did not leave what the stated accuracy allows in the end.
 pub fn unproven(problem: &Problem, level: &Level) -> Vec<usize> {
     let odd = |i: &usize| {
         let (arc, fit) = (&problem.arcs[*i], &level.fits[*i]);
-        fit.impulse.is_some() && fit.rms_m(0..arc.fitted) > problem.rms_max_m()
+        !fit.impulses.is_empty() && fit.rms_m(0..arc.fitted) > problem.rms_max_m()
     };
     (0..problem.arcs.len()).filter(odd).collect()
 }
 
 /// What was found, with the errors of the last level.
 pub fn found(problem: &Problem, level: &Level) -> Vec<Manoeuvre> {
-    (0..problem.arcs.len()).filter_map(|i| described(problem, level, i)).collect()
+    (0..problem.arcs.len()).flat_map(|i| described(problem, level, i)).collect()
 }
 
 /// Smallest velocity step that can be claimed in an arc, m/s.
@@ -89,44 +109,125 @@ fn least_m_s(arc: &Arc) -> f64 {
     UNLISTED_TIMES * UNLISTED_M_S2 * (arc.t_s[arc.fitted - 1] - arc.t_s[0])
 }
 
-fn score(arc: &Arc, with: &ArcFit, [was, is]: [f64; 2]) -> f64 {
+fn score(arc: &Arc, with: &ArcFit, steps: usize, [was, is]: [f64; 2]) -> f64 {
     let n = independent(&residual(arc, with), 6);
-    let tried = arc.fitted as f64;
-    2.0 * n * (was / is.max(1e-300)).ln() - UNKNOWNS * n.ln() - 2.0 * tried.ln()
+    let (tried, steps) = (arc.fitted as f64, steps as f64);
+    2.0 * n * (was / is.max(1e-300)).ln() - steps * (UNKNOWNS * n.ln() + 2.0 * tried.ln())
 }
 
-/// The best instant among the epochs by linear columns, then a full fit from there.
-fn fitted(problem: &Problem, level: &Level, i: usize) -> Option<ArcFit> {
+/// The best instants among the epochs by linear columns, then a full fit from there.
+fn fitted(problem: &Problem, level: &Level, i: usize, count: usize) -> Option<ArcFit> {
     let (arc, fit) = (&problem.arcs[i], &level.fits[i]);
     if arc.fitted < 2 * EDGE_EPOCHS + 8 {
         return None;
     }
-    let active: usize = fit.coefficients.iter().map(|(term, _)| term.parameters().len()).sum();
-    let mut base = fit.partials.view((0, 0), (3 * arc.fitted, 6 + active)).into_owned();
-    for mut column in base.column_iter_mut() {
+    let scan = Scan::new(arc, fit);
+    let (places, left) = scan.best(count)?;
+    // Linear columns see an orbit that is still bent to the steps: only what is far from enough is turned away here.
+    if left > 0.25 * scan.residual.norm_squared() {
+        return None;
+    }
+    let step = solve(&scan.joined(&places), &scan.residual)?;
+    let mut from = fit.clone();
+    let impulse = |(j, k): (usize, &usize)| Impulse {
+        // Half a spacing before the epoch: the instant is free on both sides.
+        at_s: 0.5 * (arc.t_s[*k] + arc.t_s[*k - 1]),
+        dv_m_s: step.fixed_rows::<3>(3 * j).into_owned(),
+    };
+    from.impulses = places.iter().enumerate().map(impulse).collect();
+    Some(problem.fit_arc(arc, &level.baseline, Some(&from)))
+}
+
+/// The span between two velocity steps that would take most off an odd arc, s, and what they would leave, m: where something is to be looked
+/// for, whatever it is.
+pub fn span(problem: &Problem, level: &Level, i: usize) -> Option<([f64; 2], f64)> {
+    let (arc, fit) = (&problem.arcs[i], &level.fits[i]);
+    if arc.fitted < 2 * EDGE_EPOCHS + 8 || !fit.rms_m(0..arc.fitted).is_finite() {
+        return None;
+    }
+    let scan = Scan::new(arc, fit);
+    let (places, left) = scan.best(2)?;
+    let left_m = (left / arc.fitted as f64).sqrt();
+    (left < TOLD * scan.residual.norm_squared()).then(|| ([arc.t_s[places[0] - 1], arc.t_s[places[1]]], left_m))
+}
+
+/// An arc's residual, and the columns of a velocity step at each of its epochs, with all that is fitted projected out.
+struct Scan {
+    residual: DVector<f64>,
+    columns: Vec<(usize, DMatrix<f64>)>,
+}
+
+impl Scan {
+    fn new(arc: &Arc, fit: &ArcFit) -> Self {
+        let active: usize = fit.coefficients.iter().map(|(term, _)| term.parameters().len()).sum();
+        let base = fit.partials.view((0, 0), (3 * arc.fitted, 6 + active)).into_owned();
+        let q = basis(base);
+        let y = residual(arc, fit);
+        let at = |k: usize| columns(arc, fit, k).map(|columns| (k, &columns - &q * q.tr_mul(&columns)));
+        Self {
+            residual: &y - &q * q.tr_mul(&y),
+            columns: (EDGE_EPOCHS..arc.fitted - EDGE_EPOCHS).filter_map(at).collect(),
+        }
+    }
+
+    fn joined(&self, places: &[usize]) -> DMatrix<f64> {
+        let mut joined = DMatrix::zeros(self.residual.len(), 3 * places.len());
+        for (j, place) in places.iter().enumerate() {
+            if let Some((_, own)) = self.columns.iter().find(|(k, _)| k == place) {
+                joined.columns_mut(3 * j, 3).copy_from(own);
+            }
+        }
+        joined
+    }
+
+    /// The instant that leaves least beside steps at others, with the squares that it leaves.
+    fn beside(&self, others: &[usize]) -> Option<(usize, f64)> {
+        let q = (!others.is_empty()).then(|| basis(self.joined(others)));
+        let without = |m: &DMatrix<f64>| q.as_ref().map_or_else(|| m.clone(), |q| m - q * q.tr_mul(m));
+        let y = without(&DMatrix::from_column_slice(self.residual.len(), 1, self.residual.as_slice()))
+            .column(0)
+            .into_owned();
+        let apart = |k: usize| others.iter().all(|other| k.abs_diff(*other) >= APART_EPOCHS);
+        let tried = self.columns.iter().filter(|(k, _)| apart(*k)).filter_map(|(k, own)| {
+            let own = without(own);
+            let step = solve(&own, &y)?;
+            Some((*k, (&y - own * step).norm_squared()))
+        });
+        tried.min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// The instants of one step or two. Of two each is looked for beside the other in turns, from many first places: the best of one alone
+    /// may be between them.
+    fn best(&self, count: usize) -> Option<(Vec<usize>, f64)> {
+        let (alone, left) = self.beside(&[])?;
+        if count < 2 {
+            return Some((vec![alone], left));
+        }
+        let firsts = self.columns.iter().step_by(self.columns.len().div_ceil(FIRST_PLACES)).map(|(k, _)| *k);
+        let settle = |first: usize| {
+            let (mut pair, mut least) = ([first, first], f64::INFINITY);
+            for round in 0..ROUNDS_MAX {
+                let (k, left) = self.beside(&[pair[round % 2]])?;
+                pair[(round + 1) % 2] = k;
+                if left >= least {
+                    break;
+                }
+                least = left;
+            }
+            pair.sort_unstable();
+            Some((pair.to_vec(), least))
+        };
+        firsts.chain([alone]).filter_map(settle).min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+/// Orthonormal columns of the same space.
+fn basis(mut columns: DMatrix<f64>) -> DMatrix<f64> {
+    for mut column in columns.column_iter_mut() {
         let norm = column.norm().max(1e-300);
         column /= norm;
     }
-    let q = base.qr().q();
-    let y = residual(arc, fit);
-    let y = &y - &q * q.tr_mul(&y);
-    let tried = (EDGE_EPOCHS..arc.fitted - EDGE_EPOCHS).filter_map(|k| {
-        let columns = columns(arc, fit, k)?;
-        let columns = &columns - &q * q.tr_mul(&columns);
-        let step = solve(&columns, &y)?;
-        let left = (&y - columns * &step).norm_squared();
-        Some((k, step, left))
-    });
-    let (k, step, left) = tried.min_by(|a, b| a.2.total_cmp(&b.2))?;
-    // Linear columns see an orbit that is still bent to the step: only what is far from enough is turned away here.
-    if left > 0.25 * y.norm_squared() {
-        return None;
-    }
-    let mut from = fit.clone();
-    // Half a spacing before the epoch: the instant is free on both sides.
-    let at_s = 0.5 * (arc.t_s[k] + arc.t_s[k - 1]);
-    from.impulse = Some(Impulse { at_s, dv_m_s: Vector3::new(step[0], step[1], step[2]) });
-    Some(problem.fit_arc(arc, &level.baseline, Some(&from)))
+    columns.qr().q()
 }
 
 /// Positions' columns of a velocity step at an epoch: Phi(t, t_k) = Phi(t, t_0) Phi(t_k, t_0)^-1.
@@ -153,45 +254,49 @@ fn radial_and_normal(t_s: &[f64], observed_m: &[Vector3<f64>], at_s: f64) -> [Ve
     [position.normalize(), observed_m[after - 1].cross(&observed_m[after]).normalize()]
 }
 
-fn described(problem: &Problem, level: &Level, i: usize) -> Option<Manoeuvre> {
+fn described(problem: &Problem, level: &Level, i: usize) -> Vec<Manoeuvre> {
     let (arc, fit) = (&problem.arcs[i], &level.fits[i]);
-    let impulse = fit.impulse?;
-    let mut bare = fit.clone();
-    bare.impulse = None;
-    let without = problem.fit_arc(arc, &level.baseline, Some(&bare));
-    let rms_m = [without.rms_m(0..arc.fitted), fit.rms_m(0..arc.fitted)];
+    if fit.impulses.is_empty() {
+        return Vec::new();
+    }
     let active: usize = fit.coefficients.iter().map(|(term, _)| term.parameters().len()).sum();
-    let last = fit.partials.ncols() - 4;
-    let used: Vec<usize> = (0..6 + active).chain(last..last + 4).collect();
-    let covariance = covariance(problem, arc, fit, &used)?;
-    let of = |direction: &Vector3<f64>| {
-        let mut weights = DVector::zeros(used.len());
-        for axis in 0..3 {
-            weights[6 + active + axis] = direction[axis];
+    let first = fit.partials.ncols() - 4 * fit.impulses.len();
+    let used: Vec<usize> = (0..6 + active).chain(first..fit.partials.ncols()).collect();
+    let Some(covariance) = covariance(problem, arc, fit, &used) else { return Vec::new() };
+    let one = |(place, impulse): (usize, &Impulse)| {
+        let mut without = fit.clone();
+        without.impulses.remove(place);
+        let without = problem.fit_arc(arc, &level.baseline, Some(&without));
+        let rms_m = [without.rms_m(0..arc.fitted), fit.rms_m(0..arc.fitted)];
+        let column = 6 + active + 4 * place;
+        let of = |direction: &Vector3<f64>| {
+            let mut weights = DVector::zeros(used.len());
+            weights.fixed_rows_mut::<3>(column).copy_from(direction);
+            (impulse.dv_m_s.dot(direction), weights.dot(&(&covariance * &weights)).max(0.0).sqrt())
+        };
+        let at_sigma_s = covariance[(column + 3, column + 3)].max(0.0).sqrt();
+        let directions = |at_s: f64| {
+            let [radial, normal] = radial_and_normal(&arc.t_s, &arc.observed_m, at_s);
+            [radial, normal.cross(&radial), normal]
+        };
+        // The directions turn with the instant, which has an error as well.
+        let [there, later] = [impulse.at_s, impulse.at_s + at_sigma_s].map(directions);
+        let turned = |k: usize| {
+            let (value, sigma) = of(&there[k]);
+            (value, sigma.hypot(impulse.dv_m_s.dot(&(later[k] - there[k]))))
+        };
+        Manoeuvre {
+            arc: i,
+            impulse: *impulse,
+            dv_m_s: of(&impulse.dv_m_s.normalize()),
+            rtn_m_s: [0, 1, 2].map(turned),
+            at_sigma_s,
+            score: score(arc, fit, 1, rms_m),
+            rms_m,
+            of_two: fit.impulses.len() > 1,
         }
-        (impulse.dv_m_s.dot(direction), weights.dot(&(&covariance * &weights)).max(0.0).sqrt())
     };
-    let at = 6 + active + 3;
-    let at_sigma_s = covariance[(at, at)].max(0.0).sqrt();
-    let directions = |at_s: f64| {
-        let [radial, normal] = radial_and_normal(&arc.t_s, &arc.observed_m, at_s);
-        [radial, normal.cross(&radial), normal]
-    };
-    // The directions turn with the instant, which has an error as well.
-    let [there, later] = [impulse.at_s, impulse.at_s + at_sigma_s].map(directions);
-    let turned = |k: usize| {
-        let (value, sigma) = of(&there[k]);
-        (value, sigma.hypot(impulse.dv_m_s.dot(&(later[k] - there[k]))))
-    };
-    Some(Manoeuvre {
-        arc: i,
-        impulse,
-        dv_m_s: of(&impulse.dv_m_s.normalize()),
-        rtn_m_s: [0, 1, 2].map(turned),
-        at_sigma_s,
-        score: score(arc, fit, rms_m),
-        rms_m,
-    })
+    fit.impulses.iter().enumerate().map(one).collect()
 }
 
 #[cfg(test)]

@@ -1,23 +1,29 @@
 //! Precise orbits against a list of forces: what is missing from the list, per satellite and for all.
 
+mod air;
 pub mod arc;
 pub mod blunders;
+mod compare;
 pub mod finer;
 pub mod forces;
+mod formula;
 pub mod held_out;
+mod ladder;
 pub mod manoeuvre;
+mod notes;
 pub mod own;
 pub mod report;
 pub mod search;
 pub mod sp3;
+pub mod unlisted;
 
 use std::collections::BTreeMap;
 
 use thiserror::Error;
 
 use self::arc::Arc;
-use self::forces::{Baseline, Environment, Term};
-use self::search::Problem;
+use self::forces::{Air, Baseline, Environment, Finer, Term};
+use self::search::{Problem, Search};
 use crate::diagnose::keys::{lookup, texts};
 use crate::diagnose::measured::{Answer, MeasuredCase, MeasuredError, Plates};
 use crate::physics::earth_orientation::{EarthOrientation, EarthOrientationError};
@@ -96,8 +102,34 @@ pub enum OrbitError {
 pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<(Answer, Plates), MeasuredError> {
     let mut problem = problem(case, files)?;
     blunders::leave_out(&mut problem);
-    let search = finer::settled(&mut problem);
-    Ok((report::answer(&case.id, &problem, &search), report::plates(&problem, &search)))
+    let search = searched(&mut problem);
+    Ok((report::answer(&case.id, &problem, &search), ladder::plates(&problem, &search)))
+}
+
+/// The whole search, with what acts beside the catalogue.
+pub fn searched(problem: &mut Problem) -> Search {
+    let search = finer::settled(problem);
+    let search = beside_the_catalogue(problem, search);
+    let last = &search.levels[search.levels.len() - 1];
+    let drag = last.accepted.iter().any(|(term, _)| *term == Term::Drag);
+    let Environment { finer, air, .. } = problem.environment;
+    if finer == Finer::ALL || !(drag || search.unlisted.is_some()) {
+        return search;
+    }
+    // What was found here was not there when the finer terms were weighed.
+    (problem.environment.finer, problem.environment.air) = (Finer::ALL, Air::MEAN);
+    let other = problem.search(&mut |_| ());
+    let other = beside_the_catalogue(problem, other);
+    if compare::evidence_over(problem, &other.end().fits, &search.end().fits) > 0.0 {
+        return other;
+    }
+    (problem.environment.finer, problem.environment.air) = (finer, air);
+    search
+}
+
+fn beside_the_catalogue(problem: &mut Problem, search: Search) -> Search {
+    let search = air::settled(problem, search);
+    unlisted::settled(problem, search)
 }
 
 /// The case's arcs and forces.
@@ -142,7 +174,7 @@ pub fn problem(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<
         let what = wanted.map_or("a satellite".to_owned(), |ids| format!("any of the satellites {}", ids.join(", ")));
         return Err(OrbitError::Empty { what }.into());
     }
-    Ok(Problem { environment, baseline, arcs, sigma_m, left_out })
+    Ok(Problem { environment, baseline, arcs, sigma_m, stated_sigma_m: sigma_m, left_out })
 }
 
 fn wanted(case: &MeasuredCase) -> Result<Option<Vec<String>>, MeasuredError> {

@@ -37,7 +37,7 @@ fn of_arc(problem: &Problem, level: &Level, i: usize) -> Option<Own> {
     let (arc, fit) = (&problem.arcs[i], &level.fits[i]);
     let was = fit.rms_m(0..arc.fitted);
     // What the only arc asks for, the search has asked already.
-    if problem.arcs.len() == 1 || fit.impulse.is_some() || !was.is_finite() || was <= problem.rms_max_m() {
+    if problem.arcs.len() == 1 || !fit.impulses.is_empty() || !was.is_finite() || was <= problem.rms_max_m() {
         return None;
     }
     let tried = |term: Term| {

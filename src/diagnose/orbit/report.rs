@@ -3,36 +3,39 @@
 use nalgebra::Vector3;
 
 use super::arc::{Arc, ArcFit};
-use super::forces::{Finer, Term};
+use super::compare;
+use super::forces::Term;
+use super::formula;
 use super::held_out::missed_m;
-use super::manoeuvre::Manoeuvre;
+use super::ladder;
+use super::manoeuvre::{self, Manoeuvre};
+use super::notes::notes;
 use super::own::Own;
 use super::search::{
-    Estimate, Level, Problem, SCORE_MIN, Search, estimates, evidence, no_worse_foretold, predicted_m, projected_rms_m,
+    Estimate, Level, Problem, Search, estimates, evidence, no_worse_foretold, predicted_m, projected_rms_m,
 };
 use crate::diagnose::answer::{Alternative, Interval, LEAST_PROBABILITY, Located, ParameterAnswer, Verdict};
 use crate::diagnose::measured::answer::{
-    ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, StepAnswer, in_order, parameter, posterior,
+    ArcAnswer, Effect, Fit, HeldOut, Level as FitLevel, Limit, in_order, parameter, posterior,
 };
-use crate::diagnose::measured::plates::OrbitPlate;
 use crate::diagnose::measured::spread::{median, scatter};
-use crate::diagnose::measured::{Answer, Plates, log_score};
+use crate::diagnose::measured::{Answer, log_score};
 
 /// Posterior from which on a term that all arcs together show is an effect of one of them.
 const SHOWN: f64 = 0.5;
 
 /// Times the stated accuracy from which on what remains of an arc is told: half of what makes it unexplained.
-const LOUD: f64 = 2.0;
+pub(super) const LOUD: f64 = 2.0;
 
 /// Every arc's estimates of every accepted term.
 pub type Table = Vec<(Term, f64, Vec<Vec<Estimate>>)>;
 
 /// Put a search into an answer.
 pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
-    let (first, end) = (&search.levels[0], &search.end());
+    let (first, end) = (&ladder::as_it_stands(problem, search), &search.end());
     let table = table(problem, end);
     let mut arcs: Vec<ArcAnswer> =
-        (0..problem.arcs.len()).map(|i| arc_answer(problem, search, end, &table, i)).collect();
+        (0..problem.arcs.len()).map(|i| arc_answer(problem, search, [first, end], &table, i)).collect();
     let unexplained = arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).count();
     let named: Vec<bool> =
         table.iter().enumerate().map(|(step, (term, ..))| explains(problem, search, &arcs, step, *term)).collect();
@@ -42,7 +45,7 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
     let nothing = !named.contains(&true) && search.manoeuvres.is_empty() && search.own.is_empty();
     // Where nothing is named, a single arc that holds something is no silence.
     let odd = if nothing { unexplained > 0 } else { 2 * unexplained > arcs.len() };
-    let verdict = match (nothing, odd) {
+    let verdict = match (nothing, odd || search.unlisted.is_some()) {
         (_, true) => Verdict::Unexplained,
         (true, false) => Verdict::Consistent,
         (false, false) => Verdict::Explained,
@@ -59,7 +62,7 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
     let weakest = scores.fold(f64::INFINITY, f64::min);
     let false_alarm_probability = match verdict {
         Verdict::Explained => (-0.5 * weakest).exp().clamp(LEAST_PROBABILITY, 1.0),
-        Verdict::Unexplained => (-0.5 * SCORE_MIN).exp(),
+        Verdict::Unexplained => chance_of_the_odd(problem, search, &arcs),
         _ => (-0.5 * strongest_refused).exp().clamp(0.0, 1.0),
     };
     Answer {
@@ -69,17 +72,26 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
         false_alarm_probability,
         located: located(problem, search, &arcs, nothing),
         alternatives: alternatives(search, &table),
-        hypothesis: None,
+        hypothesis: formula::hypothesis(problem, search),
         unit: "m".to_owned(),
         fit: fit(problem, first, end),
         upper_limits: limits(problem, search, end),
         separating_observation: None,
         cannot_tell_apart: Vec::new(),
-        steps: steps(problem, search),
+        steps: ladder::steps(problem, search),
         notes: notes(problem, &arcs, search),
         effects: in_order(effects),
         arcs,
     }
+}
+
+/// Chance that noise leaves what is unexplained.
+fn chance_of_the_odd(problem: &Problem, search: &Search, arcs: &[ArcAnswer]) -> f64 {
+    let last = &search.levels[search.levels.len() - 1];
+    let odd = (0..arcs.len()).filter(|i| arcs[*i].verdict == Verdict::Unexplained);
+    let least = odd.map(|i| compare::log_chance(problem, i, &last.fits[i])).fold(0.0, f64::min);
+    let of_formula = search.unlisted.as_ref().map_or(0.0, |found| -0.5 * found.score);
+    least.min(of_formula).exp().clamp(LEAST_PROBABILITY, 1.0)
 }
 
 /// Whether a term explains any arc that asks for it: a push of unknown size that is asked for by arcs alone that stay unexplained with it,
@@ -103,39 +115,10 @@ fn unclaim(arc: &mut ArcAnswer, id: &str) {
     }
 }
 
-/// Numbers for the figures.
-pub fn plates(problem: &Problem, search: &Search) -> Plates {
-    let end = search.end();
-    let each = |of: &dyn Fn(&Arc, &ArcFit) -> Option<f64>| {
-        let level =
-            |level: &Level| problem.arcs.iter().zip(&level.fits).filter_map(|(arc, fit)| of(arc, fit)).collect();
-        let before = &search.levels[..search.levels.len() - 1];
-        before.iter().chain([&end]).map(level).collect::<Vec<Vec<f64>>>()
-    };
-    let added = |level: &Level| level.accepted.last().map_or("as it stands", |(term, _)| term.id()).to_owned();
-    Plates::Orbit(OrbitPlate {
-        arcs: problem.arcs.iter().map(|arc| arc.id.clone()).collect(),
-        added: search.levels.iter().map(added).collect(),
-        rms_m: each(&|arc, fit| Some(fit.rms_m(0..arc.fitted))),
-        predicted_m: each(&predicted_m),
-        rms_max_m: problem.rms_max_m(),
-    })
-}
-
 /// Estimates of every accepted term in every arc.
 pub fn table(problem: &Problem, last: &Level) -> Table {
     let of = |term: Term| (0..problem.arcs.len()).map(|i| estimates(problem, last, i, term)).collect();
     last.accepted.iter().map(|(term, score)| (*term, *score, of(*term))).collect()
-}
-
-fn steps(problem: &Problem, search: &Search) -> Vec<StepAnswer> {
-    let one = |level: &Level| StepAnswer {
-        added: level.accepted.last().map(|(term, _)| term.id().to_owned()),
-        rms: problem.median_rms_m(level),
-        predicted_rms: problem.median_predicted_m(level),
-        score: level.accepted.last().map(|(_, score)| *score),
-    };
-    search.levels.iter().map(one).collect()
 }
 
 fn effect(term: Term, score: f64, parameters: Vec<ParameterAnswer>, why: String, rms: Vec<f64>) -> Effect {
@@ -159,10 +142,11 @@ fn manoeuvre_effect(problem: &Problem, one: &Manoeuvre, of_many: bool) -> Effect
     ];
     let id = &problem.arcs[one.arc].id;
     let why = format!(
-        "{}One velocity step takes the 3-D residual of the arc from {:.3} m to {:.3} m.",
+        "{}A velocity step takes the 3-D residual of the arc from {:.3} m to {:.3} m{}.",
         if of_many { format!("{id} alone: ") } else { String::new() },
         one.rms_m[0],
-        one.rms_m[1]
+        one.rms_m[1],
+        if one.of_two { ", the other one fitted beside it" } else { "" }
     );
     Effect {
         id: "manoeuvre".to_owned(),
@@ -238,8 +222,7 @@ fn common(term: Term, name: &str, rows: &[Vec<Estimate>], k: usize) -> Parameter
     parameter(name, median(values), sigma, term.unit())
 }
 
-fn arc_answer(problem: &Problem, search: &Search, end: &Level, table: &Table, i: usize) -> ArcAnswer {
-    let first = &search.levels[0];
+fn arc_answer(problem: &Problem, search: &Search, [first, end]: [&Level; 2], table: &Table, i: usize) -> ArcAnswer {
     let (arc, fit) = (&problem.arcs[i], &end.fits[i]);
     let rms_after = fit.rms_m(0..arc.fitted);
     let mut effects: Vec<Effect> = Vec::new();
@@ -258,6 +241,8 @@ fn arc_answer(problem: &Problem, search: &Search, end: &Level, table: &Table, i:
         .extend(search.manoeuvres.iter().filter(|one| one.arc == i).map(|one| manoeuvre_effect(problem, one, false)));
     effects.extend(search.own.iter().filter(|one| one.arc == i).map(|one| own_effect(problem, end, one, false)));
     let left = rms_after > problem.rms_max_m();
+    let without = &search.levels[search.levels.len() - 1].fits[i];
+    let by_formula = search.unlisted.is_some() && compare::of_arc(problem, i, fit, without) > 0.0;
     let (verdict, effects, fitted_beside, note) = if left {
         let note = format!(
             "{} remain where {:.3} m is the most that the stated accuracy allows; nothing in the catalogue that is larger than the pushes that satellites have and no list does removes it.",
@@ -268,6 +253,10 @@ fn arc_answer(problem: &Problem, search: &Search, end: &Level, table: &Table, i:
             },
             problem.rms_max_m()
         );
+        (Verdict::Unexplained, Vec::new(), effects, Some(note))
+    } else if by_formula {
+        let was = without.rms_m(0..arc.fitted);
+        let note = format!("The push of `hypothesis`, that no catalogue has, takes {was:.3} m to {rms_after:.3} m.");
         (Verdict::Unexplained, Vec::new(), effects, Some(note))
     } else {
         // A term that all arcs together show need not show in each.
@@ -280,13 +269,7 @@ fn arc_answer(problem: &Problem, search: &Search, end: &Level, table: &Table, i:
         verdict,
         effects: in_order(effects),
         fitted_beside,
-        // The first level may hold the arc's velocity step already.
-        rms_before: search
-            .manoeuvres
-            .iter()
-            .filter(|one| one.arc == i)
-            .map(|one| one.rms_m[0])
-            .fold(first.fits[i].rms_m(0..arc.fitted), f64::max),
+        rms_before: first.fits[i].rms_m(0..arc.fitted),
         rms_after,
         predicted_rms: predicted_m(arc, fit),
         fitted: arc.fitted,
@@ -401,9 +384,22 @@ fn located(problem: &Problem, search: &Search, arcs: &[ArcAnswer], nothing: bool
         return Located::default();
     }
     let interval = |arc: &&ArcAnswer| {
-        let own = problem.arcs.iter().find(|a| a.id == arc.id)?;
-        let (start_s, end_s) = (own.t_s[0], own.t_s[own.fitted - 1]);
-        Some(Interval { start_s, end_s, why: format!("{}: {:.3} m unexplained", arc.id, arc.rms_after) })
+        let place = problem.arcs.iter().position(|a| a.id == arc.id)?;
+        let own = &problem.arcs[place];
+        let left_m = search.levels[search.levels.len() - 1].fits[place].rms_m(0..own.fitted);
+        let of_arc = match &search.unlisted {
+            None => manoeuvre::span(problem, &search.end(), place),
+            Some(_) => None,
+        };
+        let Some(([start_s, end_s], would_m)) = of_arc else {
+            let why = format!("{}: {left_m:.3} m unexplained", arc.id);
+            return Some(Interval { start_s: own.t_s[0], end_s: own.t_s[own.fitted - 1], why });
+        };
+        let why = format!(
+            "{}: {left_m:.3} m unexplained; a push in this span, as two velocity steps, would leave {would_m:.3} m",
+            arc.id
+        );
+        Some(Interval { start_s, end_s, why })
     };
     let axes = ["radial", "along", "cross"].map(str::to_owned).to_vec();
     let kicked = |one: &Manoeuvre| {
@@ -433,64 +429,4 @@ fn located(problem: &Problem, search: &Search, arcs: &[ArcAnswer], nothing: bool
             .collect(),
         ..Located::default()
     }
-}
-
-fn finer(Finer { tide, relativity }: Finer) -> &'static str {
-    match (tide, relativity) {
-        (true, true) => {
-            "The pull of Sun and Moon includes the tide they raise in the solid Earth; the Earth's relativistic term is in."
-        }
-        (true, false) => {
-            "The recording has no relativistic term, as every satellite has: a computed orbit, it seems. The pull of Sun and Moon \
-             includes the tide they raise in the solid Earth; the relativistic term is left out here too."
-        }
-        (false, true) => {
-            "The recording has no tide of the solid Earth, as every satellite feels: a computed orbit, it seems. It is left out here too; \
-             the Earth's relativistic term is in."
-        }
-        (false, false) => {
-            "The recording has neither the tide of the solid Earth nor the Earth's relativistic term, as every satellite has: a computed \
-             orbit, it seems. Both are left out here too."
-        }
-    }
-}
-
-fn notes(problem: &Problem, arcs: &[ArcAnswer], search: &Search) -> Vec<String> {
-    let mut notes = vec![
-        "The initial state of every arc, and the coefficients of radiation terms that the simulation includes, are estimated with it."
-            .to_owned(),
-        finer(problem.environment.finer).to_owned(),
-    ];
-    let masked: usize = problem.arcs.iter().map(|arc| arc.masked).sum();
-    if masked > 0 {
-        let are = if masked == 1 {
-            "position is left out: it is missing, cannot be read, or is"
-        } else {
-            "positions are left out: they are missing, cannot be read, or are"
-        };
-        notes.push(format!("{masked} {are} off the orbit through the others."));
-    }
-    if !problem.left_out.is_empty() {
-        notes.push(format!("Left out: {}.", problem.left_out.join("; ")));
-    }
-    let odd: Vec<&str> =
-        arcs.iter().filter(|arc| arc.verdict == Verdict::Unexplained).map(|arc| arc.id.as_str()).collect();
-    if !odd.is_empty() {
-        notes.push(format!("Unexplained, and given no cause: {}.", odd.join(", ")));
-    }
-    let stated_m = 3f64.sqrt() * problem.sigma_m;
-    let above = |arc: &&ArcAnswer| arc.verdict != Verdict::Unexplained && arc.rms_after > LOUD * stated_m;
-    let loud: Vec<String> = arcs
-        .iter()
-        .filter(above)
-        .map(|arc| format!("{} ({:.3} m, {:.1} times)", arc.id, arc.rms_after, arc.rms_after / stated_m))
-        .collect();
-    if !loud.is_empty() && search.manoeuvres.is_empty() {
-        notes.push(format!(
-            "More remains than the stated accuracy, {stated_m:.3} m in three dimensions, in {}: no more than the pushes that satellites \
-             have and no list does, so that nothing is claimed of it. A velocity step too small to be told from these may be there.",
-            loud.join(", ")
-        ));
-    }
-    notes
 }

@@ -11,7 +11,9 @@ use super::arc::{Arc, ArcFit};
 use super::forces::{Baseline, Environment, Moment, Term};
 use super::manoeuvre::{self, Manoeuvre};
 use super::own::{self, Own};
+use super::unlisted::Found;
 use crate::diagnose::measured::spread::{median, memory};
+use crate::math::shared_work;
 use crate::physics::integrator::State;
 
 /// Evidence that all arcs together must give for a term: odds of one in 8,000 for chance at twice the log.
@@ -37,8 +39,10 @@ pub struct Problem {
     pub baseline: Baseline,
     /// The arcs.
     pub arcs: Vec<Arc>,
-    /// Accuracy of a coordinate, m.
+    /// Accuracy of a coordinate, m: the stated one, or what the positions themselves scatter by where that is more.
     pub sigma_m: f64,
+    /// The stated one, m.
+    pub stated_sigma_m: f64,
     /// Satellites of the recording with too few positions to fit.
     pub left_out: Vec<String>,
 }
@@ -75,12 +79,18 @@ pub struct Search {
     pub manoeuvres: Vec<Manoeuvre>,
     /// Pushes of single satellites beside the last level.
     pub own: Vec<Own>,
+    /// A push that no catalogue has, beside the last level.
+    pub unlisted: Option<Found>,
 }
 
 impl Search {
     /// The last level, with what single satellites have for themselves.
     pub fn end(&self) -> Level {
-        let mut end = self.levels[self.levels.len() - 1].clone();
+        let last = &self.levels[self.levels.len() - 1];
+        let mut end = last.clone();
+        if let Some(found) = &self.unlisted {
+            end = Level { accepted: last.accepted.clone(), ..found.level.clone() };
+        }
         self.own.iter().for_each(|own| end.fits[own.arc] = own.fit.clone());
         end
     }
@@ -103,8 +113,8 @@ impl Problem {
 
     /// Fit every arc to a model.
     pub fn fit(&self, baseline: &Baseline, accepted: Vec<(Term, f64)>, from: Option<&[ArcFit]>) -> Level {
-        let one = |(i, arc): (usize, &Arc)| self.fit_arc(arc, baseline, from.map(|fits| &fits[i]));
-        Level { baseline: baseline.clone(), accepted, fits: self.arcs.iter().enumerate().map(one).collect() }
+        let one = |i: usize| self.fit_arc(&self.arcs[i], baseline, from.map(|fits| &fits[i]));
+        Level { baseline: baseline.clone(), accepted, fits: shared_work::map_range(self.arcs.len(), one) }
     }
 
     /// Fit one arc to a model.
@@ -152,7 +162,7 @@ impl Problem {
         let levels = self.look_back(levels);
         let last = &levels[levels.len() - 1];
         let (manoeuvres, own) = (manoeuvre::found(self, last), own::found(self, last));
-        Search { levels, first_scores, refused, manoeuvres, own }
+        Search { levels, first_scores, refused, manoeuvres, own, unlisted: None }
     }
 
     /// Rms that one arc would keep with a term (as it stands without one), by its linear columns, m.
@@ -179,15 +189,21 @@ impl Problem {
         if kept == last.accepted && levels.iter().all(|level| kicks(level) == kicks(last)) {
             return levels;
         }
+        self.walk(&levels, kept.into_iter())
+    }
+
+    /// From the simulation as it stands, with the velocity steps of the last of some levels, a term a step.
+    pub(super) fn walk(&self, levels: &[Level], terms: impl Iterator<Item = (Term, f64)>) -> Vec<Level> {
+        let last = &levels[levels.len() - 1];
         let mut first = levels[0].clone();
         for (i, (fit, final_fit)) in first.fits.iter_mut().zip(&last.fits).enumerate() {
-            if fit.impulse != final_fit.impulse {
-                let from = ArcFit { impulse: final_fit.impulse, ..fit.clone() };
+            if fit.impulses != final_fit.impulses {
+                let from = ArcFit { impulses: final_fit.impulses.clone(), ..fit.clone() };
                 *fit = self.fit_arc(&self.arcs[i], &self.baseline, Some(&from));
             }
         }
         let mut walked = vec![first];
-        for (term, score) in kept {
+        for (term, score) in terms {
             let level = &walked[walked.len() - 1];
             let mut accepted = level.accepted.clone();
             accepted.push((term, score));
@@ -232,9 +248,9 @@ impl Problem {
     }
 }
 
-/// Which arcs have a velocity step in a level.
-fn kicks(level: &Level) -> Vec<bool> {
-    level.fits.iter().map(|fit| fit.impulse.is_some()).collect()
+/// How many velocity steps the arcs have in a level.
+fn kicks(level: &Level) -> Vec<usize> {
+    level.fits.iter().map(|fit| fit.impulses.len()).collect()
 }
 
 /// Rms of an arc's prediction beyond its fit, m.
