@@ -30,6 +30,20 @@ pub enum EarthOrientationError {
         /// What was there.
         found: String,
     },
+    /// A value that the Earth never has.
+    #[error("line {line}: {what} is {found}, expected less than {most} {unit} either way")]
+    Beyond {
+        /// Line number, from 1.
+        line: usize,
+        /// Column.
+        what: &'static str,
+        /// What was there.
+        found: f64,
+        /// The most.
+        most: f64,
+        /// Unit of both.
+        unit: &'static str,
+    },
     /// The table is too short to interpolate.
     #[error("Earth orientation has {found} days, expected at least 2")]
     TooShort {
@@ -132,6 +146,18 @@ impl EarthOrientation {
             let &[mjd_utc, xp, yp, ut1_utc, dx, dy] = finite.as_slice() else {
                 return Err(EarthOrientationError::Line { line: i + 1, found: line.to_owned() });
             };
+            // UTC is kept within 0.9 s of UT1, and the pole within a second of arc of its reference.
+            for (what, found, most, unit) in [
+                ("xp", xp, 1.0, "arcsec"),
+                ("yp", yp, 1.0, "arcsec"),
+                ("UT1-UTC", ut1_utc, 1.0, "s"),
+                ("dx", dx, 100.0, "mas"),
+                ("dy", dy, 100.0, "mas"),
+            ] {
+                if found.abs() >= most {
+                    return Err(EarthOrientationError::Beyond { line: i + 1, what, found, most, unit });
+                }
+            }
             let ut1_tai = ut1_utc - tai_minus_utc_s(mjd_utc)?;
             let mas = ARCSEC_RAD / 1000.0;
             rows.push(Row { mjd_utc, value: [xp * ARCSEC_RAD, yp * ARCSEC_RAD, ut1_tai, dx * mas, dy * mas] });

@@ -94,11 +94,11 @@ pub enum Term {
     DegreesFrom(usize),
     /// Sunlight's push away from the Sun, none in shadow.
     SolarRadiation,
-    /// A constant along the panel axis.
+    /// A constant along the panel axis, in shadow as well.
     YBias,
-    /// A constant along B.
+    /// A constant along B, none in shadow.
     BBias,
-    /// Along B, with the cosine and the sine of the argument of latitude.
+    /// Along B, with the cosine and the sine of the argument of latitude; none in shadow.
     OncePerRev,
     /// Air drag, for orbits low enough to have air.
     Drag,

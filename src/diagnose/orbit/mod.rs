@@ -159,16 +159,25 @@ pub fn problem(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<
         return Err(case.wrong("recording.position_sigma_m", "a number above zero"));
     }
     let wanted = wanted(case)?;
-    let (mut arcs, mut left_out) = (Vec::new(), recording.cut_short.clone());
+    let (mut arcs, mut left_out, mut short) = (Vec::new(), recording.amiss.clone(), None);
     for track in &recording.tracks {
         if wanted.as_ref().is_none_or(|ids| ids.contains(&track.id)) {
             match Arc::new(track, &environment, fit_s) {
                 Ok(arc) => arcs.push(arc),
                 // Asked for by name, or the only one: say what is wrong. Among many, one too short is left out.
                 Err(error) if wanted.is_some() || recording.tracks.len() == 1 => return Err(error.into()),
-                Err(error) => left_out.push(error.to_string()),
+                Err(error) => {
+                    left_out.push(error.to_string());
+                    short.get_or_insert(error);
+                }
             }
         }
+    }
+    let held = |id: &&String| recording.tracks.iter().any(|track| track.id == **id);
+    let absent: Vec<&String> = wanted.iter().flatten().filter(|id| !held(id)).collect();
+    left_out.extend(absent.iter().map(|id| format!("{id}, which the recording does not hold")));
+    if let (true, Some(error)) = (arcs.is_empty(), short) {
+        return Err(error.into());
     }
     if arcs.is_empty() {
         let what = wanted.map_or("a satellite".to_owned(), |ids| format!("any of the satellites {}", ids.join(", ")));

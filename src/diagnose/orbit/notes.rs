@@ -33,8 +33,16 @@ pub fn notes(problem: &Problem, arcs: &[ArcAnswer], search: &Search) -> Vec<Stri
             .to_owned(),
         finer(problem.environment.finer).to_owned(),
     ];
-    let air = problem.environment.air;
     let last = &search.levels[search.levels.len() - 1];
+    let of_panels = |term: &Term| matches!(term, Term::YBias | Term::BBias | Term::OncePerRev);
+    if last.accepted.iter().map(|(term, _)| term).chain(&problem.baseline.estimated).any(of_panels) {
+        notes.push(
+            "Directions: D from the satellite to the Sun, Y along D x r (r from the Earth's centre), B along D x Y. The pushes of sunlight \
+             (along -D), along B and once per revolution stop in shadow; that along Y does not. cos and sin are of the argument of latitude."
+                .to_owned(),
+        );
+    }
+    let air = problem.environment.air;
     if air != Air::MEAN && last.accepted.iter().any(|(term, _)| *term == Term::Drag) {
         notes.push(format!(
             "Drag is that of air which thins to 1/e in {:.0} km: the {:.0} km assumed at first explain less. Its fraction is of 0.01 m^2/kg \

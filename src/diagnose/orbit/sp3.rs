@@ -3,7 +3,7 @@
 //! Missing positions (0.000000), predicted ones and isolated blunders are left out and counted, never filled. Not here:
 //! clocks, velocities, correlations.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use nalgebra::Vector3;
 
@@ -49,8 +49,8 @@ pub struct Recording {
     pub origin: GpsInstant,
     /// The satellites, by name.
     pub tracks: Vec<Track>,
-    /// Files that hold fewer epochs than their first line announces, in words.
-    pub cut_short: Vec<String>,
+    /// What files lack or hold twice, in words: fewer epochs than their first line announces, positions of one epoch.
+    pub amiss: Vec<String>,
 }
 
 impl Recording {
@@ -58,20 +58,27 @@ impl Recording {
     pub fn read(files: &[(String, String)]) -> Result<Self, OrbitError> {
         let mut satellites: BTreeMap<String, BTreeMap<i64, Found>> = BTreeMap::new();
         let mut origin: Option<GpsInstant> = None;
-        let mut cut_short = Vec::new();
+        let mut amiss = Vec::new();
         for (name, text) in files {
-            let held = read_file(name, text, &mut origin, &mut satellites)?;
+            let Held { epochs: held, twice } = read_file(name, text, &mut origin, &mut satellites)?;
             // Columns 33 to 39 of the first line: how many epochs follow.
             let announced = text.get(32..39).and_then(|count| count.trim().parse::<usize>().ok());
             if let Some(announced) = announced.filter(|announced| held < *announced) {
-                cut_short.push(format!("{name} announces {announced} epochs and holds {held}"));
+                amiss.push(format!("{name} announces {announced} epochs and holds {held}"));
+            }
+            if twice > 0 {
+                let positions = if twice == 1 { "a position".to_owned() } else { format!("{twice} positions") };
+                amiss.push(format!("of {positions} that {name} gives twice, the earlier"));
             }
         }
         let origin = origin.ok_or(OrbitError::Empty { what: "an epoch".to_owned() })?;
+        if let Some(what) = no_kilometres(&satellites) {
+            return Err(OrbitError::Empty { what });
+        }
         let first_us = satellites.values().filter_map(|found| found.keys().next()).min().copied().unwrap_or(0);
         let shift_s = first_us as f64 / 1e6;
         let tracks = satellites.into_iter().map(|(id, found)| track(id, found, shift_s)).collect();
-        Ok(Self { origin: origin.plus_s(shift_s), tracks, cut_short })
+        Ok(Self { origin: origin.plus_s(shift_s), tracks, amiss })
     }
 
     /// Length of the recording, s.
@@ -87,20 +94,41 @@ struct Found {
     manoeuvre: bool,
 }
 
-/// Read one file; how many epochs it holds.
+/// Where no position can be one in kilometres: what was looked for, and what is there.
+fn no_kilometres(satellites: &BTreeMap<String, BTreeMap<i64, Found>>) -> Option<String> {
+    let mut all = satellites.iter().flat_map(|(id, found)| found.values().map(move |one| (id, one)));
+    if all.clone().any(|(_, one)| one.usable) {
+        return None;
+    }
+    let written = |one: &Found| {
+        one.fixed_m.norm() > 0.0 && one.fixed_m.iter().all(|x| x.abs() != ABSENT_KM * 1000.0 + 999.999_999)
+    };
+    let (id, one) = all.find(|(_, one)| written(one))?;
+    let km = one.fixed_m.norm() / 1000.0;
+    Some(format!("a position in km, 6000 to 999999 from the Earth's centre: that of {id} is {km:.3}"))
+}
+
+/// What a file holds.
+struct Held {
+    epochs: usize,
+    twice: usize,
+}
+
+/// Read one file.
 fn read_file(
     name: &str,
     text: &str,
     origin: &mut Option<GpsInstant>,
     satellites: &mut BTreeMap<String, BTreeMap<i64, Found>>,
-) -> Result<usize, OrbitError> {
+) -> Result<Held, OrbitError> {
     if !text.starts_with('#') {
         let found = text.lines().next().unwrap_or("").chars().take(20).collect();
         return Err(OrbitError::Sp3 { file: name.to_owned(), line: 1, expected: "a line starting with #", found });
     }
     let mut scale = String::from("GPS");
     let mut now_us: Option<i64> = None;
-    let mut epochs = 0;
+    let mut held = Held { epochs: 0, twice: 0 };
+    let mut seen = HashSet::new();
     for (i, line) in text.lines().enumerate() {
         let bad = |expected| OrbitError::Sp3 { file: name.to_owned(), line: i + 1, expected, found: line.to_owned() };
         match line.as_bytes().first() {
@@ -110,20 +138,21 @@ fn read_file(
             Some(b'*') => {
                 let instant =
                     epoch(line, &scale).ok_or_else(|| bad("an epoch: * year month day hour minute second"))?;
-                epochs += 1;
+                held.epochs += 1;
                 let base = *origin.get_or_insert(instant);
                 now_us = Some((instant.since_s(base) * 1e6).round() as i64);
             }
             Some(b'P') => {
                 let now_us = now_us.ok_or_else(|| bad("an epoch line before the first position"))?;
                 let (id, found) = position(line).ok_or_else(|| bad("P, a satellite and three coordinates in km"))?;
+                held.twice += usize::from(!seen.insert((id.clone(), now_us)));
                 satellites.entry(id).or_default().insert(now_us, found);
             }
             _ if line.starts_with("EOF") => break,
             _ => {}
         }
     }
-    Ok(epochs)
+    Ok(held)
 }
 
 fn epoch(line: &str, scale: &str) -> Option<GpsInstant> {
@@ -257,6 +286,18 @@ mod tests {
             assert_eq!(track.masked, usize::from(off_m != 0.0), "{off_m}");
             assert_eq!(track.t_s.contains(&36_000.0), off_m == 0.0, "{off_m}");
         }
+    }
+
+    /// The same file in metres; and one that gives an epoch twice.
+    #[test]
+    fn metres_are_refused_and_what_is_given_twice_is_told() {
+        let lines = "*  2010  7  1  0  0  0.00000000\nPG01 18392619.1170  7490690.4080 -17846346.485 999999.999999\n";
+        let error = read(lines).unwrap_err().to_string();
+        assert!(error.ends_with("from the Earth's centre: that of G01 is 26700217.203"), "{error}");
+        let once = "*  2010  7  1  0  0  0.00000000\nPG01  18392.619117   7490.690408 -17846.346485 999999.999999\n";
+        let recording = read(&format!("{once}{once}")).unwrap();
+        assert!(recording.amiss.iter().any(|words| words.starts_with("of a position that a.sp3 gives twice")));
+        assert_eq!(recording.tracks[0].t_s.len(), 1);
     }
 
     #[test]

@@ -36,18 +36,28 @@ pub fn settled(problem: &Problem, search: Search) -> Search {
     let end = search.end();
     let (known, free): (Vec<Term>, Vec<Term>) =
         end.accepted.iter().map(|(term, _)| *term).partition(|term| term.is_known_size());
-    let odd = end.fits.iter().zip(&problem.arcs).filter(|(fit, arc)| fit.rms_m(0..arc.fitted) > problem.rms_max_m());
-    if free.is_empty() && 2 * odd.count() <= problem.arcs.len() {
+    let is_odd = |fits: &[ArcFit]| {
+        let beyond = fits.iter().zip(&problem.arcs).filter(|(fit, arc)| fit.rms_m(0..arc.fitted) > problem.rms_max_m());
+        2 * beyond.count() > problem.arcs.len()
+    };
+    let odd = is_odd(&end.fits);
+    if free.is_empty() && !odd {
         return search;
     }
     let named_rms_m = problem.median_rms_m(&end);
     let one = |kept: Vec<Term>| -> Option<(Vec<Term>, Found)> {
+        // Beside all that was named only what takes away what is too much there: every satellite has a little more than any list.
+        let beside_all = kept == free;
+        if beside_all && !odd {
+            return None;
+        }
         let terms: Vec<Term> = known.iter().chain(&kept).copied().collect();
         let baseline = terms.iter().fold(problem.baseline.clone(), |model, term| with(&model, *term));
         let (term, score, level) = best(problem, &baseline, &end.fits)?;
         let above = compare::evidence_over(problem, &level.fits, &end.fits);
         let instead_of = free.iter().filter(|term| !kept.contains(term)).copied().collect();
-        (above > MARGIN).then_some((terms, Found { term, score, instead_of, named_rms_m, above, level }))
+        (above > MARGIN && !(beside_all && is_odd(&level.fits)))
+            .then_some((terms, Found { term, score, instead_of, named_rms_m, above, level }))
     };
     let all = kept(&free).into_iter().filter_map(one);
     let Some((terms, found)) = all.max_by(|a, b| a.1.above.total_cmp(&b.1.above)) else { return search };
@@ -55,10 +65,10 @@ pub fn settled(problem: &Problem, search: Search) -> Search {
     Search { levels, unlisted: Some(found), own: Vec::new(), ..search }
 }
 
-/// Which of the named pushes may stay beside one that no catalogue has: none, sunlight, all but one, and all where there is none to spare.
+/// Which of the named pushes may stay beside one that no catalogue has: none, sunlight, all but one, all.
 fn kept(free: &[Term]) -> Vec<Vec<Term>> {
     let without = |left_out: &dyn Fn(Term) -> bool| free.iter().copied().filter(|term| !left_out(*term)).collect();
-    let mut kept: Vec<Vec<Term>> = vec![Vec::new(), without(&|term| term != Term::SolarRadiation)];
+    let mut kept: Vec<Vec<Term>> = vec![Vec::new(), without(&|term| term != Term::SolarRadiation), free.to_vec()];
     kept.extend(free.iter().map(|one| without(&|term| term == *one)));
     kept.sort();
     kept.dedup();
