@@ -1,5 +1,8 @@
 //! From a scene to weighed hypotheses: nothing, listed sets, and sets with an open form. It still decides nothing.
 
+mod lessen;
+
+use self::lessen::{lessen, merge};
 use super::catalogue::{self, Effect, Seldom};
 use super::design::Frame;
 use super::noise::AxisNoise;
@@ -44,6 +47,9 @@ const SEARCHES_MAX: usize = 4;
 /// Windows, three days of them, up to which the search and the one as if there were no slow noise go on side by side: each has a bank of its
 /// own, which grows with the square of the record, and a longer record has work enough for all processors in either.
 const SIDE_BY_SIDE_MAX: usize = 10_000;
+
+/// Log odds (of twenty) within which another set is as good, and the smaller of two nested sets is preferred.
+pub const EQUAL: f64 = 3.0;
 
 /// What a search needs beside the scene, made once a case.
 pub struct Library {
@@ -231,7 +237,10 @@ fn solve_from(scene: &Scene, library: &Library, noise_null: [AxisNoise; 3], stop
         let seldom = seldom::found(scene, library, &listed);
         merge(&mut listed, seldom);
     }
-    lessen(scene, entries, &mut listed, stop)?;
+    lessen(scene, entries, &mut listed, (|_| true, 0.0), stop)?;
+    if open.first().is_some_and(|open| listed.first().is_none_or(|listed| open.log_posterior > listed.log_posterior)) {
+        lessen(scene, entries, &mut open, (|set| library.is_open(set), EQUAL), stop)?;
+    }
     Some(Solution { listed, open, null, singles, strongest })
 }
 
@@ -435,33 +444,6 @@ fn converged(scene: &Scene, library: &Library, noise_null: &[AxisNoise; 3], stop
         noise = search::weigh_with_own_noise(scene, entries, top, &noise, 2, 50).noise;
     }
     unreachable!("the rounds end by their number")
-}
-
-/// Weighs the best set with one member less, and that again, as long as a member is not needed: what only described slow noise
-/// is found at one noise together with what is real, and every set kept may hold it.
-fn lessen(scene: &Scene, entries: &[Entry], listed: &mut Vec<Weighed>, stop: Stop) -> Option<()> {
-    loop {
-        let Some(best) = listed.first().filter(|best| best.set.members.len() > 1) else { return Some(()) };
-        let key = best.set.key();
-        if stop() {
-            return None;
-        }
-        let mut fewer: Vec<Set> = (0..best.set.members.len()).map(|i| best.set.without(i)).collect();
-        fewer.retain(|set| !listed.iter().any(|w| w.set.key() == set.key()));
-        let less =
-            shared_work::map(&fewer, |set| search::weigh_with_own_noise(scene, entries, set, &best.noise, 2, 40));
-        merge(listed, less);
-        if listed.first().is_none_or(|best| best.set.key() == key) {
-            return Some(());
-        }
-    }
-}
-
-/// Of sets found twice the better weighed one, best first.
-fn merge(sets: &mut Vec<Weighed>, more: Vec<Weighed>) {
-    sets.extend(more);
-    sets.sort_by(|a, b| b.log_posterior.total_cmp(&a.log_posterior));
-    search::retain_first(sets, |w| w.set.key());
 }
 
 /// The best so many of sets in order, and for each entry that all of these have the best set behind them that does without: whatever joins

@@ -39,7 +39,7 @@ pub const EFFECT: Effect = Effect {
     signature,
     exact_at: None,
     assumes: Some(assumes),
-    why: "The residual is proportional to the sensor temperature on every axis, swings with the daily and orbital cycle and lags as stated.",
+    why: "The residual follows the sensor temperature on every axis, at the lag stated.",
 };
 
 /// Longest lag, s.

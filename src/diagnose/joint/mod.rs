@@ -201,12 +201,13 @@ fn told(scene: &Scene, p: &Polynomial, weighed: &Weighed, left_ng: &Axes, nothin
         axis: p.axes.iter().map(|k| ["x", "y", "z"][*k]).collect::<Vec<_>>().join(", "),
         axes: remains::sharing(amplitude),
         location: format!(
-            "it follows {}: {} together have log odds of {log_odds:.1} against nothing, and those told say most",
+            "it follows {}: {} log odds of {log_odds:.1} against nothing{}",
             p.question.what,
             match p.terms.len() {
-                1 => "one term".to_string(),
-                n => format!("{n} terms"),
-            }
+                1 => "one term has".to_string(),
+                n => format!("{n} terms together have"),
+            },
+            if p.terms.len() == 1 { "" } else { ", and those told say most" }
         ),
         intervals: Vec::new(),
         period_s: None,

@@ -7,22 +7,23 @@
 //! old ones (the Kullback-Leibler divergence of two Gaussian records of equal covariance). Noise as fitted, the unknown
 //! constant per axis fixed in the sensor.
 //!
-//! Not simulated: events to come (none are assumed), and whether a log is complete, for which a share stands.
+//! Where no flight decides, an act that the log has is flown again without the others, and a warmer sensor. Not simulated: other events to
+//! come (none are assumed), and whether a log is complete, for which a share stands.
 
 mod outcome;
 
 use std::sync::Arc;
 
-use crate::math::shared_work;
+use crate::math::{robust, shared_work};
 use crate::physics::attitude::{self, Attitude};
 use crate::physics::orbit::{self, State};
 use crate::physics::{J2, Vec3, drag, gravity_gradient, rotation};
 use crate::units::NANO_G_M_S2;
 
-use self::outcome::{Action, Candidate, Outcome, Pair, round};
+use self::outcome::{Action, Candidate, Outcome, Pair, WARMER_C, round};
 use super::answer::SeparatingObservation;
 use super::axes;
-use super::case::{Ancillary, Case, Expectation, Simulation, WINDOW_STRIDE_S};
+use super::case::{Ancillary, Case, Event, Expectation, Simulation, WINDOW_STRIDE_S};
 use super::catalogue::{Effect, Shape, Theta};
 use super::design::{Chosen, Column, Frame, Raw};
 use super::noise::AxisNoise;
@@ -42,6 +43,15 @@ const LOG_SHOWS: [f64; 2] = [0.95, 0.02];
 const THETA_STEPS: f64 = 10.0;
 /// Effects that are born in the sensor and turn with it.
 const SENSOR_BORN: [&str; 3] = ["bias_step", "bias_drift", "temperature_bias"];
+/// Effects that last as long as an act of the log: the kind of its entries, the name of one and of several.
+const LOGGED: [(&str, &str, [&str; 2]); 3] = [
+    ("water_dump", "water_dump", ["water dump", "water dumps"]),
+    ("evaporator_venting", "evaporator", ["cycle of the evaporator", "cycles of the evaporator"]),
+    ("thruster_residual", "thruster", ["firing of the thrusters", "firings of the thrusters"]),
+];
+/// Such an act begins so long after the turn and every so often from there on, s.
+const ACT_AFTER_S: f64 = 1800.0;
+const ACT_EVERY_S: f64 = 5400.0;
 /// Attitudes to the local vertical (x forward, y opposite the orbit normal, z down): roll, pitch, yaw in degrees, and in words.
 const ATTITUDES: [([f64; 3], &str); 6] = [
     ([0.0, 0.0, 0.0], "nose forward, belly to the Earth"),
@@ -84,7 +94,32 @@ pub fn cheapest(scene: &Scene, noise: &[AxisNoise; 3], rivals: &[Rival]) -> Opti
             break;
         }
     }
+    if best.as_ref().is_none_or(|best| best.parted() == 0) {
+        let acts = acts(scene, rivals).into_iter().flat_map(|action| HOURS.map(|hours| Candidate { action, hours }));
+        let acts: Vec<Candidate> = acts.collect();
+        let tried = shared_work::map(&acts, |candidate| fly(scene, noise, &sets, &now, *candidate));
+        // The one that parts most, and of those that part as many the shortest: they are by action and by hours.
+        let better = |a: Outcome, b: Outcome| {
+            let [parts, hours] = [b.parted().cmp(&a.parted()), a.candidate.hours.total_cmp(&b.candidate.hours)];
+            if parts.then(hours).is_gt() { b } else { a }
+        };
+        best = tried.into_iter().flatten().filter(|outcome| outcome.parted() > 0).reduce(better).or(best);
+    }
     best.map(|outcome| outcome.told(rivals))
+}
+
+/// Acts of the log that some rivals have and others have not, and a warmer sensor where some go by its temperature.
+fn acts(scene: &Scene, rivals: &[Rival]) -> Vec<Action> {
+    let some = |id: &str| {
+        let has = rivals.iter().filter(|rival| rival.iter().any(|part| part.effect.id == id)).count();
+        0 < has && has < rivals.len()
+    };
+    let logged = LOGGED.into_iter().filter(|(id, ..)| some(id)).filter_map(|(_, kind, name)| {
+        let events = scene.case.events.iter().filter(|event| event.kind == kind && event.duration_s > 0.0);
+        let mut durations_s: Vec<f64> = events.map(|event| event.duration_s).collect();
+        Some(Action::Again(kind, name, robust::median(&mut durations_s)?))
+    });
+    logged.chain(some("temperature_bias").then_some(Action::Warm)).collect()
 }
 
 /// Where every pair of rivals differs by a leak, a log of pressures and valves decides without any flying.
@@ -314,6 +349,15 @@ fn to_come(scene: &Scene, action: Action, hours: f64) -> Option<(Case, Surroundi
         series.truncate(cut);
         series.extend(new);
     }
+    if let Action::Again(kind, _, duration_s) = action {
+        let act = |n: usize| Event {
+            clock_s: from_s + TURN_S + ACT_AFTER_S + n as f64 * ACT_EVERY_S,
+            duration_s,
+            kind: kind.to_owned(),
+            detail: String::new(),
+        };
+        expected.events.extend((0..Candidate { action, hours }.acts()).map(act));
+    }
     let mut recording = scene.case.recording.clone();
     let first_s = from_s + TURN_S;
     let windows = (hours * 3600.0 / WINDOW_STRIDE_S) as usize;
@@ -355,8 +399,9 @@ fn ahead_of(scene: &Scene, last: usize, action: Action, points: usize) -> Option
     let keeps_stars = scene.w_rad_s[last].norm() < 0.3 * std::f64::consts::TAU / scene.period_s;
     let pointing = |state: &State| match action {
         Action::Hold(euler_deg, _) => attitude::hold_lvlh(state, &rad(&euler_deg)),
-        Action::Turn if !keeps_stars => to_lvlh * attitude::lvlh_from_inertial(state),
-        Action::Turn | Action::Freeze => held,
+        Action::Freeze => held,
+        _ if keeps_stars => held,
+        Action::Turn | Action::Again(..) | Action::Warm => to_lvlh * attitude::lvlh_from_inertial(state),
     };
     let mut ancillary = Ancillary::default();
     let mut simulation = Simulation::default();
@@ -375,7 +420,9 @@ fn ahead_of(scene: &Scene, last: usize, action: Action, points: usize) -> Option
         ancillary.q.push(attitude::to_scalar_first(&q));
         ancillary.w_rad_s.push(rate.into());
         ancillary.density_kg_m3.push(density);
-        ancillary.temperature_c.push(scene.temperature_c[like]);
+        ancillary
+            .temperature_c
+            .push(scene.temperature_c[like] + if matches!(action, Action::Warm) { WARMER_C } else { 0.0 });
         simulation.clock_s.push(clock_s);
         let c = attitude::body_from_inertial(&q);
         let offset = scene.vehicle.sensor_offset_m;

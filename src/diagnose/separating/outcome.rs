@@ -14,7 +14,14 @@ pub(super) enum Action {
     Turn,
     Hold([f64; 3], &'static str),
     Freeze,
+    /// An act that the log has, again and alone: of the kind, its name and that of several, how long, s.
+    Again(&'static str, [&'static str; 2], f64),
+    /// The sensor warmer by [`WARMER_C`], the attitude held as it is.
+    Warm,
 }
+
+/// By how much a sensor is made warmer.
+pub(super) const WARMER_C: f64 = 2.0;
 
 /// An action for so many hours.
 #[derive(Clone, Copy)]
@@ -24,6 +31,11 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
+    /// Acts of the log in it, one every hour and a half.
+    pub(super) fn acts(&self) -> usize {
+        (self.hours / 1.5).round().max(1.0) as usize
+    }
+
     /// What it costs, in hours.
     pub(super) fn cost_h(&self) -> f64 {
         self.hours + if matches!(self.action, Action::Turn) { 0.0 } else { MANOEUVRE_COST_H }
@@ -98,6 +110,18 @@ impl Outcome {
                 format!("Hold {words} (local vertical, roll {roll:.0}, pitch {pitch:.0}, yaw {yaw:.0} degrees)"),
             ),
             Action::Freeze => ("attitude", "Hold the present attitude fixed to the stars".to_string()),
+            Action::Again(_, [one, many], duration_s) => (
+                "log",
+                format!(
+                    "Have {} of {duration_s:.0} s and no other act of the log within half an hour of it, the attitude held as it is,",
+                    if self.candidate.acts() == 1 {
+                        format!("one {one}")
+                    } else {
+                        format!("{} {many}", self.candidate.acts())
+                    }
+                ),
+            ),
+            Action::Warm => ("temperature", format!("Warm the sensor by {WARMER_C:.0} C, the attitude held as it is,")),
         };
         let gain = self.gain();
         let named = |set: &usize| {

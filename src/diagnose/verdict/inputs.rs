@@ -26,21 +26,29 @@ pub fn of_inputs(scene: &Scene) -> Vec<String> {
 /// Windows that are not compared.
 fn of_windows(scene: &Scene) -> Vec<String> {
     let case = scene.case;
-    let spikes = format!(
-        "windows are left out: they stand alone, more than {SPIKE} standard deviations from those before and after"
-    );
+    let spikes =
+        |they| format!("left out: {they} alone, more than {SPIKE} standard deviations from those before and after");
     let told = [
         (
             case.windows_beyond,
-            "windows of the span are not compared: they are before or after what simulation and ancillary data have",
+            ["window of the span is", "windows of the span are"],
+            "not compared: before or after what simulation and ancillary data have".to_owned(),
         ),
-        (case.windows_in_holes, "windows are left out: simulation or ancillary data have a hole there"),
-        (case.windows_too_rough, "windows are left out: the simulation changes too fast there for its own grid"),
-        (case.windows_frozen, "windows are left out: an axis repeats the same value there, or all three do"),
-        (case.windows_of_spikes, &spikes),
+        (case.windows_in_holes, WINDOWS, "left out: simulation or ancillary data have a hole there".to_owned()),
+        (
+            case.windows_too_rough,
+            WINDOWS,
+            "left out: the simulation changes too fast there for its own grid".to_owned(),
+        ),
+        (case.windows_frozen, WINDOWS, "left out: an axis repeats the same value there, or all three do".to_owned()),
+        (case.windows_of_spikes, WINDOWS, spikes(if case.windows_of_spikes == 1 { "it stands" } else { "they stand" })),
     ];
-    told.iter().filter(|(count, _)| *count > 0).map(|(count, why)| format!("{count} {why}")).collect()
+    let some = told.iter().filter(|(count, ..)| *count > 0);
+    some.map(|(count, [one, many], why)| format!("{count} {} {why}", if *count == 1 { one } else { many })).collect()
 }
+
+/// A window, and more than one.
+const WINDOWS: [&str; 2] = ["window is", "windows are"];
 
 /// Rows of ancillary data that are too few for the motion.
 fn of_the_motion(scene: &Scene) -> Option<String> {
@@ -77,7 +85,9 @@ fn of_the_log(scene: &Scene) -> Vec<String> {
     let moments = events.iter().filter(|e| e.duration_s == 0.0 && LOGGED_KINDS.contains(&e.kind.as_str())).count();
     if moments > 0 {
         notes.push(format!(
-            "{moments} entries of the log last no time at all: whatever goes on for as long as they do has no windows"
+            "{} of the log {} no time at all: whatever goes on for as long has no windows",
+            if moments == 1 { "an entry".to_owned() } else { format!("{moments} entries") },
+            if moments == 1 { "lasts" } else { "last" }
         ));
     }
     notes
@@ -128,7 +138,8 @@ fn of_the_noise(scene: &Scene) -> Vec<String> {
         scene.loudness.iter().map(|axis| (0..axis.burst.len()).filter(|i| axis.is_odd(*i)).count()).sum();
     if bursts > 0 {
         notes.push(format!(
-            "{bursts} values out of the ordinary weigh less: more than {OUT} standard deviations of the noise"
+            "{bursts} {} less: more than {OUT} standard deviations of the noise",
+            if bursts == 1 { "value out of the ordinary weighs" } else { "values out of the ordinary weigh" }
         ));
     }
     notes

@@ -1,6 +1,6 @@
 //! What the evidence and the trial say, before what remains is asked.
 
-use super::credible::simplest;
+use super::credible::{simplest, simplest_open};
 use super::stands::{changes, fails, tried};
 use super::{Proof, asked, ids};
 use crate::diagnose::answer::Verdict;
@@ -62,7 +62,7 @@ pub fn judge<'a>(
     let claimed = probability <= asked(claim) && best.0.max(open.0) > null;
     let (verdict, chosen) = match (claimed, open_wins, refused) {
         (false, _, _) => (Verdict::Consistent, None),
-        (true, true, _) => (Verdict::Unexplained, open.1),
+        (true, true, _) => (Verdict::Unexplained, simplest_open(scene, library, &solution.open, to_beat)),
         (true, false, true) => (Verdict::Unexplained, best.1),
         // Neither refused nor beaten: there is one that can be believed.
         (true, false, false) => (Verdict::Explained, Some(simplest(listed))),

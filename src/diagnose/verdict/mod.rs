@@ -92,6 +92,8 @@ impl Place {
 /// Log evidence lost to noise that is not white, from which on it is told: so much, and such a share of all.
 const TOLD_OF_COLOUR: f64 = 1.0;
 const TOLD_SHARE_OF_COLOUR: f64 = 0.05;
+/// What is left of the evidence is proof enough from here on, whatever was lost.
+const BEYOND_COLOUR: f64 = 30.0;
 
 /// What proof there is, and what is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -308,7 +310,7 @@ fn of_resonances(scene: &Scene, null: &Weighed) -> Vec<String> {
 /// Says by how much evidence was lessened, where that may matter.
 fn of_colour(statistic: f64, proven: f64) -> Option<String> {
     let lessened = statistic - proven;
-    (lessened > TOLD_OF_COLOUR.max(TOLD_SHARE_OF_COLOUR * statistic)).then(|| {
+    (lessened > TOLD_OF_COLOUR.max(TOLD_SHARE_OF_COLOUR * statistic) && proven < BEYOND_COLOUR).then(|| {
         format!(
             "what remains is louder than the noise fitted at the periods of the best hypothesis, or not white: {lessened:.1} of its \
              {statistic:.1} in log evidence (natural logarithm of odds) is no proof"

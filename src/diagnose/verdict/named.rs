@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::credible::{EQUAL, is_nested};
+use super::credible::is_nested;
 use super::imitators::imitators;
 use super::{Best, effect_of, ids};
 use crate::diagnose::answer::{Alternative, Diagnosis, EffectAnswer, ParameterAnswer, Verdict};
@@ -11,7 +11,7 @@ use crate::diagnose::design::Column;
 use crate::diagnose::scene::Scene;
 use crate::diagnose::search::{Entry, Family, Member, Set, Weighed};
 use crate::diagnose::separating::{self, Part, Rival};
-use crate::diagnose::solve::Library;
+use crate::diagnose::solve::{EQUAL, Library};
 use crate::math::rms::rms_about_mean;
 
 /// Log odds within which a set that does not hold the best one, nor is held by it, cannot be told from it: sets whose signatures

@@ -40,7 +40,7 @@ fn near_fail(library: &Library, best: &Best, listed: &[&Weighed]) -> String {
 }
 
 /// From the open forms that won, or from the listed set that leads and cannot be believed, with the listed sets that came near. What of the
-/// catalogue is in it stands with its parameters: the formula gives what was fitted.
+/// catalogue is in it stands as its equation with its parameters, and without its name: the formula gives what was fitted.
 pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed]) -> Hypothesis {
     let fails = near_fail(library, best, listed);
     let mut formula = Vec::new();
@@ -53,7 +53,7 @@ pub fn hypothesis(library: &Library, best: &Best, listed: &[&Weighed]) -> Hypoth
             Family::Listed(effect) => {
                 let of = |p: &Fitted| format!("{} = {}", p.name, with_error(p.value, p.sigma));
                 let parameters: Vec<String> = best.fits[i].parameters.iter().map(of).collect();
-                formula.push(format!("{} with {}", effect.id, parameters.join(", ")));
+                formula.push(format!("({}) with {}", effect.equation, parameters.join(", ")));
                 axis.push(axes);
                 location.push(effect.covariate.replace('_', " "));
                 continue;
