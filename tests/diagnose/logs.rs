@@ -1,6 +1,10 @@
 //! Logs as they are kept: by another clock, of very many kinds, with one night twice.
 
+use std::sync::Arc;
+
 use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
+use oare_ground::diagnose::answer::Verdict;
+use oare_ground::diagnose::case::{Event, Expectation};
 use oare_ground::diagnose::{Settings, diagnose};
 
 use super::drag_case::{drag, files, with_key, with_lines};
@@ -79,4 +83,26 @@ fn a_log_that_is_hours_off_is_asked_about() {
         let note = asked(3600.0).unwrap_or_default();
         assert!(note.contains("3600 s later") && note.contains(effect), "{effect}: {note}");
     }
+}
+
+/// Two acts that the log always has at the same time: no attitude tells which of them pushes, one of them alone does.
+#[test]
+fn acts_that_are_always_logged_together_are_told_apart_by_one_alone() {
+    let order = Order { kind: Kind::One, seed: 1_460_003, only: Some("water_dump"), manner: Manner::default() };
+    let mut case = super::case(&draw_order(&order).files);
+    let mut expected = Expectation::clone(&case.expected);
+    expected.events.retain(|event| event.kind != "evaporator");
+    let dumps: Vec<Event> = expected.events.iter().filter(|event| event.kind == "water_dump").cloned().collect();
+    assert!(!dumps.is_empty());
+    expected.events.extend(dumps.into_iter().map(|dump| Event { kind: "evaporator".into(), ..dump }));
+    expected.events.sort_by(|a, b| a.clock_s.total_cmp(&b.clock_s));
+    case.expected = Arc::new(expected);
+    let found = diagnose(&case, &Settings::default()).unwrap();
+    assert_eq!(found.verdict, Verdict::Ambiguous, "{:?} {:?}", super::ids(&found), found.alternatives);
+    for id in ["water_dump", "evaporator_venting"] {
+        assert!(found.cannot_tell_apart.iter().any(|set| *set == [id]), "{:?}", found.cannot_tell_apart);
+    }
+    let told = found.separating_observation.expect("what would decide");
+    assert_eq!(told.kind, "log", "{told:?}");
+    assert!(told.text.starts_with("Have one water dump of ") && told.gain.unwrap() > 3.0, "{told:?}");
 }

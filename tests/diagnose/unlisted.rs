@@ -3,6 +3,7 @@
 use oare_ground::challenge::conceal::{Kind, Manner, Order, draw_order};
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::case::Case;
+use oare_ground::diagnose::catalogue;
 use oare_ground::diagnose::measure::{weighted_coverage, window_means};
 use oare_ground::diagnose::{Settings, diagnose};
 use oare_ground::physics::{shadow, sun};
@@ -35,6 +36,9 @@ fn is_unlisted(case: &Case, formula: &str) {
     assert!(found.effects.is_empty());
     let told = found.hypothesis.unwrap().formula;
     assert!(told.contains(formula), "{formula}: {told}");
+    // A kind of the log's entries may have the name of an effect.
+    let named = catalogue::ALL.iter().filter(|effect| !catalogue::LOGGED_KINDS.contains(&effect.id));
+    assert_eq!(named.filter(|effect| told.contains(effect.id)).count(), 0, "{told}");
 }
 
 /// It rises at once as a step does, and on as a drift does.
