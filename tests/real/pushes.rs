@@ -35,6 +35,37 @@ fn a_push_along_the_track_is_a_formula_and_no_radiation() {
     );
 }
 
+/// Of three satellites one is pushed along its track: a push along its panels' axis would take most of it off.
+#[test]
+fn a_push_of_one_satellite_that_no_catalogue_has_is_told_there() {
+    let mut satellites = three();
+    for satellite in &mut satellites {
+        satellite.terms.retain(|(term, _)| *term != Term::YBias);
+    }
+    satellites[1].terms.push((Term::Unlisted(Unlisted::Steady(Direction::Along)), [6e-10, 0.0]));
+    let answer = Made::every_quarter((2016, 8, 2), 40.0, satellites).diagnose(&without("srp_y_bias"));
+    assert_eq!((answer.verdict, ids(&answer)), (Verdict::Unexplained, vec![]), "{:?}", answer.effects);
+    let verdicts: Vec<Verdict> = answer.arcs.iter().map(|a| a.verdict).collect();
+    assert_eq!(verdicts, [Verdict::Consistent, Verdict::Unexplained, Verdict::Consistent]);
+    let hypothesis = answer.hypothesis.expect("a formula");
+    assert!(hypothesis.formula.starts_with("a = 6.0") && hypothesis.axis == "along", "{hypothesis:?}");
+    assert!(hypothesis.location.starts_with("G02 alone"), "{hypothesis:?}");
+    let note = answer.arcs[1].note.clone().expect("a note");
+    assert!(note.contains("along, a = 6.0"), "{note}");
+}
+
+/// Once per revolution along the radius, which one along B takes for its own in part.
+#[test]
+fn a_radial_push_once_per_revolution_is_a_formula() {
+    let mut satellites = three();
+    for satellite in &mut satellites {
+        satellite.terms.push((Term::Unlisted(Unlisted::PerRevolution(Direction::Radial)), [2e-9, 0.0]));
+    }
+    let answer = Made::every_quarter((2016, 8, 2), 40.0, satellites).diagnose(&ALL);
+    assert_eq!((answer.verdict, ids(&answer)), (Verdict::Unexplained, vec![]), "{:?}", answer.effects);
+    assert_eq!(answer.hypothesis.expect("a formula").axis, "radial");
+}
+
 /// A simulation that has the Moon beside a recording that was computed without.
 #[test]
 fn a_pull_that_the_recording_has_not_is_told() {

@@ -69,6 +69,7 @@ fn orbits(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<Vec<S
             arcs: vec![arc.clone()],
             sigma_m: all.sigma_m,
             stated_sigma_m: all.stated_sigma_m,
+            scatter_m: all.scatter_m,
             left_out: Vec::new(),
         };
         let level = problem.fit(&full, Vec::new(), None);
@@ -165,6 +166,7 @@ fn orbit_said(problem: &Problem, degree_left: usize, removed: &str) -> Said {
         arcs: problem.arcs.clone(),
         sigma_m: problem.sigma_m,
         stated_sigma_m: problem.stated_sigma_m,
+        scatter_m: problem.scatter_m,
         left_out: Vec::new(),
     };
     let search = orbit::searched(&mut reduced);

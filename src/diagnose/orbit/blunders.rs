@@ -34,7 +34,8 @@ pub fn leave_out(problem: &mut Problem) {
     };
     let left: Vec<Vec<Vector3<f64>>> = (0..problem.arcs.len()).map(|i| fit(problem, i)).collect();
     let of_arcs = problem.arcs.iter().zip(&left).map(|(arc, left)| (arc.t_s.as_slice(), left.as_slice()));
-    if let Some(sigma_m) = scatter_m(of_arcs).filter(|sigma_m| *sigma_m > BELIEVED * problem.sigma_m) {
+    problem.scatter_m = scatter_m(of_arcs);
+    if let Some(sigma_m) = problem.scatter_m.filter(|sigma_m| *sigma_m > BELIEVED * problem.sigma_m) {
         problem.sigma_m = sigma_m;
     }
     let least_m = TIMES * 3f64.sqrt() * problem.sigma_m;

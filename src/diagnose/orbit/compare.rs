@@ -14,8 +14,9 @@ pub(super) struct Left {
 impl Left {
     pub(super) fn of(problem: &Problem, arc: &Arc, fit: &ArcFit) -> Self {
         let left = residual(arc, fit);
-        // Below its accuracy a recording tells nothing.
-        let floor = left.len() as f64 * problem.sigma_m.powi(2);
+        // Below its accuracy a recording tells nothing: the stated one, or where its positions scatter by less, that.
+        let accuracy_m = problem.scatter_m.map_or(problem.sigma_m, |scatter_m| scatter_m.min(problem.sigma_m));
+        let floor = left.len() as f64 * accuracy_m.powi(2);
         let unknowns = fit.unknowns();
         Self { squares: left.norm_squared().max(floor), independent: independent(&left, unknowns), unknowns }
     }

@@ -102,6 +102,8 @@ pub enum Term {
     OncePerRev,
     /// Air drag, for orbits low enough to have air.
     Drag,
+    /// The day's denser air, beside drag.
+    Bulge,
     /// A push that no catalogue has, which is never named: it shows what a name is worth.
     Unlisted(Unlisted),
 }
@@ -113,6 +115,11 @@ pub enum Unlisted {
     Steady(Direction),
     /// The cosine and the sine of the argument of latitude in one.
     PerRevolution(Direction),
+    /// What grows from nothing at the recording's first epoch in one; the coefficient is that of a day later.
+    Growing(Direction),
+    /// Away from the Earth while the Sun is over the horizon below, as light from the Earth pushes: the size is that under the Sun at one
+    /// Earth radius.
+    DaySide,
     /// The pull of the Sun taken away, from a simulation that has it and a recording that has not.
     NoSun,
     /// That of the Moon.
@@ -164,6 +171,7 @@ impl Term {
             Self::BBias => "srp_b_bias",
             Self::OncePerRev => "srp_once_per_rev",
             Self::Drag => "aerodynamic_drag",
+            Self::Bulge => "diurnal_bulge",
             Self::Unlisted(_) => "unlisted",
         }
     }
@@ -179,6 +187,7 @@ impl Term {
             Self::BBias => "Constant along B, across the panels' axis and the Sun's direction",
             Self::OncePerRev => "Once-per-revolution push along B",
             Self::Drag => "Aerodynamic drag",
+            Self::Bulge => "Day-night variation of density",
             Self::Unlisted(_) => "A push that no catalogue has",
         }
     }
@@ -187,15 +196,19 @@ impl Term {
     pub fn parameters(self) -> &'static [&'static str] {
         match self {
             Self::Sun | Self::Moon | Self::DegreesFrom(_) | Self::Drag => &["fraction"],
-            Self::SolarRadiation | Self::YBias | Self::BBias | Self::Unlisted(Unlisted::Steady(_)) => &["accel_m_s2"],
+            Self::SolarRadiation
+            | Self::YBias
+            | Self::BBias
+            | Self::Unlisted(Unlisted::Steady(_) | Unlisted::Growing(_)) => &["accel_m_s2"],
             Self::OncePerRev | Self::Unlisted(Unlisted::PerRevolution(_)) => &["cos_m_s2", "sin_m_s2"],
+            Self::Bulge => &["amplitude"],
             Self::Unlisted(_) => &["fraction"],
         }
     }
 
     /// Unit of the coefficients.
     pub fn unit(self) -> &'static str {
-        if self.is_known_size() || self == Self::Drag { "1" } else { "m/s^2" }
+        if self.is_known_size() || matches!(self, Self::Drag | Self::Bulge) { "1" } else { "m/s^2" }
     }
 
     /// Whether physics fixes the coefficient beforehand: then it must come out as one.
@@ -209,8 +222,10 @@ impl Term {
         match self {
             Self::SolarRadiation => 1e-7,
             Self::YBias | Self::BBias | Self::OncePerRev => 1e-9,
-            Self::Unlisted(Unlisted::Steady(_) | Unlisted::PerRevolution(_)) => 1e-9,
-            Self::Sun | Self::Moon | Self::DegreesFrom(_) | Self::Drag | Self::Unlisted(_) => 1.0,
+            Self::Unlisted(
+                Unlisted::Steady(_) | Unlisted::Growing(_) | Unlisted::PerRevolution(_) | Unlisted::DaySide,
+            ) => 1e-9,
+            Self::Sun | Self::Moon | Self::DegreesFrom(_) | Self::Drag | Self::Bulge | Self::Unlisted(_) => 1.0,
         }
     }
 }
@@ -228,6 +243,7 @@ pub struct Baseline {
 
 /// The geometry of one moment, shared by all terms.
 pub struct Moment {
+    t_s: f64,
     state: State,
     rotation: Matrix3<f64>,
     bodies: SunMoon,
@@ -239,7 +255,7 @@ impl Moment {
     pub fn new(environment: &Environment, t_s: f64, state: &State) -> Self {
         let bodies = environment.bodies.at(t_s);
         let sunlit = sunlit(&state.r, &bodies);
-        Self { state: *state, rotation: environment.rotation.inertial_to_fixed(t_s), bodies, sunlit }
+        Self { t_s, state: *state, rotation: environment.rotation.inertial_to_fixed(t_s), bodies, sunlit }
     }
 
     /// The Earth's axis in the inertial frame.
@@ -278,6 +294,7 @@ impl Moment {
                 [b * cos * self.sunlit, b * sin * self.sunlit]
             }
             Term::Drag => [self.drag(environment.air), zero],
+            Term::Bulge => [self.drag(environment.air) * self.from_the_bulge(), zero],
             Term::Unlisted(unlisted) => self.unlisted(environment, unlisted),
         }
     }
@@ -290,6 +307,12 @@ impl Moment {
                 let (sin, cos) = self.argument_of_latitude().sin_cos();
                 let unit = direction.unit(&self.state);
                 [unit * cos, unit * sin]
+            }
+            Unlisted::Growing(direction) => [direction.unit(&self.state) * (self.t_s / 86_400.0), Vector3::zeros()],
+            Unlisted::DaySide => {
+                let up = self.state.r.normalize();
+                let day = self.bodies.sun_m.normalize().dot(&up).max(0.0);
+                [up * (day * (EARTH_RADIUS_M / self.state.r.norm()).powi(2)), Vector3::zeros()]
             }
             Unlisted::NoSun => taken_away(Term::Sun),
             Unlisted::NoMoon => taken_away(Term::Moon),
@@ -315,14 +338,30 @@ impl Moment {
         self.state.r.dot(&normal.cross(&node)).atan2(self.state.r.dot(&node))
     }
 
+    /// Cosine of the angle from the bulge's apex: the Sun's direction turned 30 degrees eastward.
+    fn from_the_bulge(&self) -> f64 {
+        let sun = self.bodies.sun_m.normalize();
+        let pole = self.pole();
+        let (sin, cos) = 30_f64.to_radians().sin_cos();
+        let apex = sun * cos + pole.cross(&sun) * sin + pole * (pole.dot(&sun) * (1.0 - cos));
+        apex.dot(&self.state.r.normalize())
+    }
+
     /// Drag of a satellite of 0.01 m^2/kg and coefficient 2.2 in an exponential atmosphere. The form is what is looked for; the fraction
     /// carries what is not known.
     fn drag(&self, air: Air) -> Vector3<f64> {
         let wind = self.state.v - self.pole().cross(&self.state.r) * EARTH_RATE_RAD_S;
-        let height_m = self.state.r.norm() - EARTH_RADIUS_M;
-        let density = air.density_kg_m3(height_m);
+        let density = air.density_kg_m3(height_m(&self.state.r, &self.pole()));
         wind * (-0.5 * density * 2.2 * 0.01 * wind.norm())
     }
+}
+
+/// Height over the Earth's ellipsoid, which the air follows, m: to the first order in its flattening.
+fn height_m(r_m: &Vector3<f64>, pole: &Vector3<f64>) -> f64 {
+    const FLATTENING: f64 = 1.0 / 298.257;
+    let distance = r_m.norm();
+    let sine = r_m.dot(pole) / distance;
+    distance - EARTH_RADIUS_M * (1.0 - FLATTENING * sine * sine)
 }
 
 /// Light left by the Earth and the Moon.

@@ -1,4 +1,4 @@
-//! Velocity steps of one satellite, one or two: looked for at every epoch by the columns they would have, then fitted with their instants.
+//! Velocity steps of one satellite, one to three: looked for at every epoch by the columns they would have, then fitted with their instants.
 //!
 //! It belongs to one arc and is no common cause. It is claimed only where it leaves what the stated accuracy allows, and is
 //! larger than what an unlisted push gains over the arc, or leaves nothing else: four free numbers take something off any odd arc. Not here: terms that push all the time (`search`).
@@ -6,7 +6,9 @@
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 
 use super::arc::{Arc, ArcFit, Impulse, solve};
-use super::search::{Level, Problem, SCORE_MIN, UNLISTED_M_S2, covariance, independent, residual};
+use super::forces::Term;
+use super::search::{Level, Problem, SCORE_MIN, UNLISTED_M_S2, covariance, independent, left_with_m, residual};
+use super::unlisted::pushes;
 use crate::physics::earth_orientation::lagrange_weights;
 
 /// Epochs at either end of an arc between which an instant is looked for.
@@ -21,15 +23,17 @@ const UNLISTED_TIMES: f64 = 10.0;
 const CLEAN: f64 = 1.5;
 const CLEAN_LEFT: f64 = 0.05;
 /// Most steps that one arc can have.
-const STEPS_MAX: usize = 2;
+const STEPS_MAX: usize = 3;
 /// Places from which two are looked for.
 const FIRST_PLACES: usize = 12;
 /// Epochs by which two are apart at least.
 const APART_EPOCHS: usize = 2;
-/// Rounds in which each of two instants is looked for again beside the other.
+/// Rounds in which each of several instants is looked for again beside the others.
 const ROUNDS_MAX: usize = 6;
 /// Two that leave less than this part of the squares say where an arc is odd.
 const TOLD: f64 = 0.04;
+/// A push that lasts and leaves no more than this times what velocity steps leave is likelier than they.
+const AS_WELL: f64 = 1.1;
 /// Unknowns of a velocity step.
 const UNKNOWNS: f64 = 4.0;
 
@@ -50,8 +54,8 @@ pub struct Manoeuvre {
     pub score: f64,
     /// 3-D rms of the arc without it and with it, m.
     pub rms_m: [f64; 2],
-    /// Whether the arc has another, which is in both of these.
-    pub of_two: bool,
+    /// Whether the arc has others, which are in both of these.
+    pub of_several: bool,
 }
 
 /// The level with velocity steps in the arcs that ask for one beyond what the best common term gives them (`rivals`: rms
@@ -68,12 +72,22 @@ pub fn step(problem: &Problem, level: &Level, rivals: &[f64]) -> Option<Level> {
         let believed = |count: usize| {
             fitted(problem, level, i, count).filter(|tried| believe(problem, arc, tried, [was, rivals[i]]))
         };
-        if let Some(tried) = (1..=STEPS_MAX).find_map(believed) {
+        let is_push = |tried: &ArcFit| pushed_rms_m(problem, level, i) <= AS_WELL * tried.rms_m(0..arc.fitted);
+        if let Some(tried) = (1..=STEPS_MAX).find_map(believed).filter(|tried| !is_push(tried)) {
             next.fits[i] = tried;
             any = true;
         }
     }
     any.then_some(next)
+}
+
+/// Rms that an arc would keep with the best push that lasts and that no catalogue has, by its columns, m.
+fn pushed_rms_m(problem: &Problem, level: &Level, i: usize) -> f64 {
+    let (arc, fit) = (&problem.arcs[i], &level.fits[i]);
+    let terms: Vec<Term> = pushes().map(Term::Unlisted).collect();
+    let active = &level.baseline.estimated;
+    let wide = arc.fit(&problem.environment, &level.baseline, active, &terms, Some(fit));
+    terms.into_iter().map(|term| left_with_m(arc, &wide, term)).fold(f64::INFINITY, f64::min)
 }
 
 /// Whether velocity steps explain an arc that kept so much, and would with the best common term.
@@ -85,7 +99,7 @@ fn believe(problem: &Problem, arc: &Arc, tried: &ArcFit, [was, rival]: [f64; 2])
     if (small && !clean) || is > LEFT_MAX * was {
         return false;
     }
-    // Two take much from anything: there they must leave what the stated accuracy allows.
+    // Several take much from anything: there they must leave what the stated accuracy allows.
     let provisional = tried.impulses.len() == 1 && is < PROVISIONAL * was && is < PROVISIONAL * rival;
     (is <= problem.rms_max_m() || provisional) && score(arc, tried, tried.impulses.len(), [was, is]) > SCORE_MIN
 }
@@ -94,7 +108,8 @@ fn believe(problem: &Problem, arc: &Arc, tried: &ArcFit, [was, rival]: [f64; 2])
 pub fn unproven(problem: &Problem, level: &Level) -> Vec<usize> {
     let odd = |i: &usize| {
         let (arc, fit) = (&problem.arcs[*i], &level.fits[*i]);
-        !fit.impulses.is_empty() && fit.rms_m(0..arc.fitted) > problem.rms_max_m()
+        let needless = || described(problem, level, *i).iter().any(|one| one.score <= SCORE_MIN);
+        !fit.impulses.is_empty() && (fit.rms_m(0..arc.fitted) > problem.rms_max_m() || needless())
     };
     (0..problem.arcs.len()).filter(odd).collect()
 }
@@ -196,28 +211,42 @@ impl Scan {
         tried.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// The instants of one step or two. Of two each is looked for beside the other in turns, from many first places: the best of one alone
-    /// may be between them.
+    /// The instants of some steps. Each is looked for beside the others in turns, two from many first places: the best of one alone may be
+    /// between them.
     fn best(&self, count: usize) -> Option<(Vec<usize>, f64)> {
         let (alone, left) = self.beside(&[])?;
-        if count < 2 {
-            return Some((vec![alone], left));
-        }
-        let firsts = self.columns.iter().step_by(self.columns.len().div_ceil(FIRST_PLACES)).map(|(k, _)| *k);
-        let settle = |first: usize| {
-            let (mut pair, mut least) = ([first, first], f64::INFINITY);
-            for round in 0..ROUNDS_MAX {
-                let (k, left) = self.beside(&[pair[round % 2]])?;
-                pair[(round + 1) % 2] = k;
-                if left >= least {
-                    break;
-                }
-                least = left;
+        match count {
+            0 | 1 => Some((vec![alone], left)),
+            2 => {
+                let every = self.columns.len().div_ceil(FIRST_PLACES);
+                let firsts = self.columns.iter().step_by(every).map(|(k, _)| *k).chain([alone]);
+                let settled = firsts.filter_map(|first| self.settle(vec![first, self.beside(&[first])?.0]));
+                settled.min_by(|a, b| a.1.total_cmp(&b.1))
             }
-            pair.sort_unstable();
-            Some((pair.to_vec(), least))
-        };
-        firsts.chain([alone]).filter_map(settle).min_by(|a, b| a.1.total_cmp(&b.1))
+            _ => {
+                let (mut places, _) = self.best(count - 1)?;
+                places.push(self.beside(&places)?.0);
+                self.settle(places)
+            }
+        }
+    }
+
+    /// Each place looked for again beside the others until none is better.
+    fn settle(&self, mut places: Vec<usize>) -> Option<(Vec<usize>, f64)> {
+        let mut least = f64::INFINITY;
+        for _ in 0..ROUNDS_MAX {
+            let before = least;
+            for j in 0..places.len() {
+                let others: Vec<usize> = (0..places.len()).filter(|i| *i != j).map(|i| places[i]).collect();
+                let (k, left) = self.beside(&others)?;
+                (places[j], least) = (k, left);
+            }
+            if least >= before {
+                break;
+            }
+        }
+        places.sort_unstable();
+        Some((places, least))
     }
 }
 
@@ -293,7 +322,7 @@ fn described(problem: &Problem, level: &Level, i: usize) -> Vec<Manoeuvre> {
             at_sigma_s,
             score: score(arc, fit, 1, rms_m),
             rms_m,
-            of_two: fit.impulses.len() > 1,
+            of_several: fit.impulses.len() > 1,
         }
     };
     fit.impulses.iter().enumerate().map(one).collect()

@@ -183,7 +183,7 @@ pub fn problem(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result<
         let what = wanted.map_or("a satellite".to_owned(), |ids| format!("any of the satellites {}", ids.join(", ")));
         return Err(OrbitError::Empty { what }.into());
     }
-    Ok(Problem { environment, baseline, arcs, sigma_m, stated_sigma_m: sigma_m, left_out })
+    Ok(Problem { environment, baseline, arcs, sigma_m, stated_sigma_m: sigma_m, scatter_m: None, left_out })
 }
 
 fn wanted(case: &MeasuredCase) -> Result<Option<Vec<String>>, MeasuredError> {

@@ -2,13 +2,14 @@
 //! is common, and one term of the catalogue takes that away.
 //!
 //! It belongs to that arc and is no common cause. One that another term replaces as well is not named, nor one with which the arc is worse
-//! predicted beyond its fit. Not here: what most arcs ask for
+//! predicted beyond its fit, nor one that a push no catalogue has does better than: that is told for what it is. Not here: what most arcs ask for
 //! (`search`), velocity steps (`manoeuvre`).
 
 use super::arc::ArcFit;
 use super::forces::Term;
 use super::manoeuvre::LEFT_MAX;
 use super::search::{Level, Problem, SCORE_MIN, evidence, no_worse_foretold, with};
+use super::unlisted::pushes;
 
 /// Evidence by which it must be above every other term that would do: twice the logarithm of odds of twenty.
 const MARGIN: f64 = 6.0;
@@ -28,6 +29,13 @@ pub struct Own {
     pub fit: ArcFit,
 }
 
+impl Own {
+    /// Whether it is of the catalogue.
+    pub fn is_listed(&self) -> bool {
+        !matches!(self.term, Term::Unlisted(_))
+    }
+}
+
 /// Those beside a level.
 pub fn found(problem: &Problem, level: &Level) -> Vec<Own> {
     (0..problem.arcs.len()).filter_map(|i| of_arc(problem, level, i)).collect()
@@ -40,16 +48,23 @@ fn of_arc(problem: &Problem, level: &Level, i: usize) -> Option<Own> {
     if problem.arcs.len() == 1 || !fit.impulses.is_empty() || !was.is_finite() || was <= problem.rms_max_m() {
         return None;
     }
-    let tried = |term: Term| {
+    let tried = |term: Term, wide: &ArcFit| {
         let with = problem.fit_arc(arc, &with(&level.baseline, term), Some(fit));
         let is = with.rms_m(0..arc.fitted);
         let foretold = no_worse_foretold(arc, [fit, &with]);
-        let own = Own { arc: i, term, score: evidence(arc, fit, term), rms_m: [was, is], fit: with };
+        let own = Own { arc: i, term, score: evidence(arc, wide, term), rms_m: [was, is], fit: with };
         (foretold && is <= problem.rms_max_m() && is < LEFT_MAX * was && own.score > SCORE_MIN).then_some(own)
     };
     let free = problem.candidates(&level.baseline).into_iter().filter(|term| !term.is_known_size());
-    let mut all: Vec<Own> = free.filter_map(tried).collect();
+    let unlisted = pushes().map(Term::Unlisted);
+    let all_terms: Vec<Term> = free.chain(unlisted).collect();
+    let wide = arc.fit(&problem.environment, &level.baseline, &level.baseline.estimated, &all_terms, Some(fit));
+    let mut all: Vec<Own> = all_terms.iter().filter_map(|term| tried(*term, &wide)).collect();
     all.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let second = all.get(1).map_or(f64::NEG_INFINITY, |own| own.score);
-    all.into_iter().next().filter(|own| own.score > second + MARGIN)
+    // A formula that does better than every name, or as well as the only one, is no doubt about it: it is what is told.
+    let best = all.first()?;
+    let second = all.iter().skip(1).find(|own| own.is_listed()).map_or(f64::NEG_INFINITY, |own| own.score);
+    let other = all.get(1).map_or(f64::NEG_INFINITY, |own| own.score);
+    let stands = if best.is_listed() { best.score > other + MARGIN } else { best.score > second };
+    all.into_iter().next().filter(|_| stands)
 }

@@ -146,7 +146,7 @@ fn manoeuvre_effect(problem: &Problem, one: &Manoeuvre, of_many: bool) -> Effect
         if of_many { format!("{id} alone: ") } else { String::new() },
         one.rms_m[0],
         one.rms_m[1],
-        if one.of_two { ", the other one fitted beside it" } else { "" }
+        if one.of_several { ", the others of the arc fitted beside it" } else { "" }
     );
     Effect {
         id: "manoeuvre".to_owned(),
@@ -243,6 +243,7 @@ fn arc_answer(problem: &Problem, search: &Search, [first, end]: [&Level; 2], tab
     let left = rms_after > problem.rms_max_m();
     let without = &search.levels[search.levels.len() - 1].fits[i];
     let by_formula = search.unlisted.is_some() && compare::of_arc(problem, i, fit, without) > 0.0;
+    let alone = search.alone.iter().find(|one| one.arc == i);
     let (verdict, effects, fitted_beside, note) = if left {
         let note = format!(
             "{} remain where {:.3} m is the most that the stated accuracy allows; nothing in the catalogue that is larger than the pushes that satellites have and no list does removes it.",
@@ -254,6 +255,8 @@ fn arc_answer(problem: &Problem, search: &Search, [first, end]: [&Level; 2], tab
             problem.rms_max_m()
         );
         (Verdict::Unexplained, Vec::new(), effects, Some(note))
+    } else if let Some(one) = alone {
+        (Verdict::Unexplained, Vec::new(), effects, Some(of_one_alone(problem, end, one)))
     } else if by_formula {
         let was = without.rms_m(0..arc.fitted);
         let note = format!("The push of `hypothesis`, that no catalogue has, takes {was:.3} m to {rms_after:.3} m.");
@@ -276,6 +279,16 @@ fn arc_answer(problem: &Problem, search: &Search, [first, end]: [&Level; 2], tab
         masked: arc.masked,
         note,
     }
+}
+
+/// A push of one satellite that no catalogue has, in words.
+fn of_one_alone(problem: &Problem, end: &Level, one: &Own) -> String {
+    let Term::Unlisted(term) = one.term else { return String::new() };
+    let [formula, axis, _] = formula::said(term, &[estimates(problem, end, one.arc, one.term)]);
+    let [was, is] = one.rms_m;
+    format!(
+        "A push that no catalogue has takes {was:.3} m to {is:.3} m: {axis}, {formula}. No term of the catalogue does as well."
+    )
 }
 
 /// Median over arcs of the rms along radius, track and normal, m.
@@ -387,10 +400,8 @@ fn located(problem: &Problem, search: &Search, arcs: &[ArcAnswer], nothing: bool
         let place = problem.arcs.iter().position(|a| a.id == arc.id)?;
         let own = &problem.arcs[place];
         let left_m = search.levels[search.levels.len() - 1].fits[place].rms_m(0..own.fitted);
-        let of_arc = match &search.unlisted {
-            None => manoeuvre::span(problem, &search.end(), place),
-            Some(_) => None,
-        };
+        let has_formula = search.unlisted.is_some() || search.alone.iter().any(|one| one.arc == place);
+        let of_arc = if has_formula { None } else { manoeuvre::span(problem, &search.end(), place) };
         let Some(([start_s, end_s], would_m)) = of_arc else {
             let why = format!("{}: {left_m:.3} m unexplained", arc.id);
             return Some(Interval { start_s: own.t_s[0], end_s: own.t_s[own.fitted - 1], why });

@@ -43,6 +43,8 @@ pub struct Problem {
     pub sigma_m: f64,
     /// The stated one, m.
     pub stated_sigma_m: f64,
+    /// What positions scatter by from one to the next, where that is noise, m.
+    pub scatter_m: Option<f64>,
     /// Satellites of the recording with too few positions to fit.
     pub left_out: Vec<String>,
 }
@@ -71,7 +73,7 @@ pub struct Estimate {
 pub struct Search {
     /// Levels in order.
     pub levels: Vec<Level>,
-    /// At the first step, the evidence for every candidate.
+    /// At the first step, the evidence for every candidate, of each arc all of it; most first.
     pub first_scores: Vec<(Term, f64)>,
     /// Candidates not accepted at the end, with their evidence.
     pub refused: Vec<(Term, f64)>,
@@ -79,7 +81,9 @@ pub struct Search {
     pub manoeuvres: Vec<Manoeuvre>,
     /// Pushes of single satellites beside the last level.
     pub own: Vec<Own>,
-    /// A push that no catalogue has, beside the last level.
+    /// The same that no catalogue has, of single satellites.
+    pub alone: Vec<Own>,
+    /// A push that no catalogue has, of all, beside the last level.
     pub unlisted: Option<Found>,
 }
 
@@ -91,7 +95,7 @@ impl Search {
         if let Some(found) = &self.unlisted {
             end = Level { accepted: last.accepted.clone(), ..found.level.clone() };
         }
-        self.own.iter().for_each(|own| end.fits[own.arc] = own.fit.clone());
+        self.own.iter().chain(&self.alone).for_each(|own| end.fits[own.arc] = own.fit.clone());
         end
     }
 }
@@ -103,10 +107,14 @@ impl Problem {
         if baseline.degree < self.environment.field.degree() {
             terms.push(Term::DegreesFrom(baseline.degree.max(1) + 1));
         }
-        terms.extend([Term::SolarRadiation, Term::YBias, Term::BBias, Term::OncePerRev]);
         if self.arcs.iter().any(|arc| arc.height_min_m() < AIR_TOP_M) {
+            // Before radiation: there air pushes more. Of drag alone something can be more by day.
             terms.push(Term::Drag);
+            if baseline.estimated.contains(&Term::Drag) {
+                terms.push(Term::Bulge);
+            }
         }
+        terms.extend([Term::SolarRadiation, Term::YBias, Term::BBias, Term::OncePerRev]);
         terms.retain(|term| !baseline.known.contains(term) && !baseline.estimated.contains(term));
         terms
     }
@@ -142,7 +150,8 @@ impl Problem {
             let mut scores = self.scores(&levels[last]);
             scores.sort_by(|a, b| b.1.total_cmp(&a.1));
             if step == 0 {
-                first_scores.clone_from(&scores);
+                first_scores = self.scores_up_to(&levels[last], f64::INFINITY);
+                first_scores.sort_by(|a, b| b.1.total_cmp(&a.1));
             }
             let best = scores.first().filter(|(_, score)| *score > SCORE_MIN).copied();
             let rivals: Vec<f64> = (0..self.arcs.len()).map(|i| self.left_with(&levels[last], i, best)).collect();
@@ -161,19 +170,16 @@ impl Problem {
         }
         let levels = self.look_back(levels);
         let last = &levels[levels.len() - 1];
-        let (manoeuvres, own) = (manoeuvre::found(self, last), own::found(self, last));
-        Search { levels, first_scores, refused, manoeuvres, own, unlisted: None }
+        let manoeuvres = manoeuvre::found(self, last);
+        let (own, alone) = own::found(self, last).into_iter().partition(Own::is_listed);
+        Search { levels, first_scores, refused, manoeuvres, own, alone, unlisted: None }
     }
 
     /// Rms that one arc would keep with a term (as it stands without one), by its linear columns, m.
     fn left_with(&self, level: &Level, i: usize, best: Option<(Term, f64)>) -> f64 {
         let (arc, fit) = (&self.arcs[i], &level.fits[i]);
         let now = fit.rms_m(0..arc.fitted);
-        let Some((term, _)) = best else { return now };
-        let projected = rows_of(arc, fit, |_| true, term);
-        let Some(step) = super::arc::solve(&projected.columns, &projected.residual) else { return now };
-        let left = (&projected.residual - &projected.columns * step).norm_squared();
-        (left / arc.fitted as f64).sqrt()
+        best.map_or(now, |(term, _)| left_with_m(arc, fit, term))
     }
 
     /// Drop terms that the last level can do without, and walk the way there once more in the catalogue's order, large
@@ -215,10 +221,15 @@ impl Problem {
 
     /// Evidence of every candidate at a level: the sum over arcs, and at least half of the arcs must want it.
     pub fn scores(&self, level: &Level) -> Vec<(Term, f64)> {
+        self.scores_up_to(level, SCORE_ARC_MAX)
+    }
+
+    /// The same where one arc counts for so much at most.
+    fn scores_up_to(&self, level: &Level, most: f64) -> Vec<(Term, f64)> {
         let score = |term: Term| {
             let each: Vec<f64> = self.arcs.iter().zip(&level.fits).map(|(arc, fit)| evidence(arc, fit, term)).collect();
             let wanting = each.iter().filter(|s| **s > 0.0).count();
-            let sum: f64 = each.iter().map(|s| s.min(SCORE_ARC_MAX)).sum();
+            let sum: f64 = each.iter().map(|s| s.min(most)).sum();
             if 2 * wanting >= each.len() { sum } else { sum.min(0.0) }
         };
         self.candidates(&level.baseline).into_iter().map(|term| (term, score(term))).collect()
@@ -307,6 +318,16 @@ fn rows_of(arc: &Arc, fit: &ArcFit, keep: impl Fn(Term) -> bool, wanted: Term) -
     Projected { residual, columns, unknowns: base.len() }
 }
 
+/// Rms that an arc would keep with a term, by the term's columns, m.
+pub(super) fn left_with_m(arc: &Arc, fit: &ArcFit, term: Term) -> f64 {
+    let projected = rows_of(arc, fit, |_| true, term);
+    let left = match super::arc::solve(&projected.columns, &projected.residual) {
+        Some(step) => (&projected.residual - &projected.columns * step).norm_squared(),
+        None => projected.residual.norm_squared(),
+    };
+    (left / arc.fitted as f64).sqrt()
+}
+
 /// What the whole of a term would leave in an arc beside what is fitted, rms, m.
 pub(super) fn projected_rms_m(arc: &Arc, fit: &ArcFit, term: Term) -> f64 {
     let columns = rows_of(arc, fit, |_| true, term).columns;
@@ -355,8 +376,13 @@ pub fn evidence(arc: &Arc, fit: &ArcFit, term: Term) -> f64 {
         (&projected.residual - projected.columns.column_sum(), 0.0)
     } else {
         let Some(step) = super::arc::solve(&projected.columns, &projected.residual) else { return 0.0 };
-        // Air never pushes, and no satellite is so light.
-        if term == Term::Drag && !(0.0..DRAG_MOST).contains(&step[0]) {
+        // Air never pushes, and no satellite is so light; sunlight never pulls.
+        let believed = match term {
+            Term::Drag => (0.0..DRAG_MOST).contains(&step[0]),
+            Term::SolarRadiation => step[0] >= 0.0,
+            _ => true,
+        };
+        if !believed {
             return 0.0;
         }
         (&projected.residual - &projected.columns * step, projected.columns.ncols() as f64)

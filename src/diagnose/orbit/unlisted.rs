@@ -8,7 +8,7 @@
 use super::arc::ArcFit;
 use super::compare;
 use super::forces::{Baseline, Direction, Term, Unlisted};
-use super::search::{Level, Problem, SCORE_ARC_MAX, SCORE_MIN, Search, evidence, with};
+use super::search::{Level, Problem, SCORE_MIN, Search, evidence, with};
 use crate::math::shared_work;
 
 /// Evidence by which it must be above what was named: twice the logarithm of odds of twenty.
@@ -62,7 +62,7 @@ pub fn settled(problem: &Problem, search: Search) -> Search {
     let all = kept(&free).into_iter().filter_map(one);
     let Some((terms, found)) = all.max_by(|a, b| a.1.above.total_cmp(&b.1.above)) else { return search };
     let levels = problem.walk(&search.levels, end.accepted.iter().filter(|(term, _)| terms.contains(term)).copied());
-    Search { levels, unlisted: Some(found), own: Vec::new(), ..search }
+    Search { levels, unlisted: Some(found), own: Vec::new(), alone: Vec::new(), ..search }
 }
 
 /// Which of the named pushes may stay beside one that no catalogue has: none, sunlight, all but one, all.
@@ -82,24 +82,30 @@ fn best(problem: &Problem, baseline: &Baseline, from: &[ArcFit]) -> Option<(Unli
     let one =
         |i: usize| problem.arcs[i].fit(&problem.environment, baseline, &baseline.estimated, &terms, Some(&from[i]));
     let bare: Vec<ArcFit> = shared_work::map_range(problem.arcs.len(), one);
-    let score = |term: Term| {
-        let each = problem.arcs.iter().zip(&bare).map(|(arc, fit)| evidence(arc, fit, term).min(SCORE_ARC_MAX));
-        compare::asked_for(each.collect())
+    let each = |one: &Unlisted| -> Vec<f64> {
+        problem.arcs.iter().zip(&bare).map(|(arc, fit)| evidence(arc, fit, Term::Unlisted(*one))).collect()
     };
-    let scores = all.into_iter().map(|one| (one, score(Term::Unlisted(one))));
-    let (term, score) = scores.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, score)| *score > SCORE_MIN)?;
+    // Which of them by all that the arcs say; how much they are asked for by no more than one arc may say.
+    let most = all.into_iter().max_by(|a, b| each(a).iter().sum::<f64>().total_cmp(&each(b).iter().sum::<f64>()));
+    let scored = most.map(|term| (term, compare::asked_for(each(&term))));
+    let (term, score) = scored.filter(|(_, score)| *score > SCORE_MIN)?;
     let baseline = with(baseline, Term::Unlisted(term));
     let level = problem.fit(&baseline, Vec::new(), Some(&bare));
     Some((term, score, level))
 }
 
-/// All that are tried: three directions, steady and once per revolution, and every pull of the simulation's own taken away.
+/// Pushes that one satellite may have for itself.
+pub(super) fn pushes() -> impl Iterator<Item = Unlisted> {
+    let of = |kind: fn(Direction) -> Unlisted| Direction::ALL.map(kind);
+    let kinds = [of(Unlisted::Steady), of(Unlisted::PerRevolution), of(Unlisted::Growing)];
+    kinds.into_iter().flatten().chain([Unlisted::DaySide])
+}
+
+/// All that are tried: three directions, steady, once per revolution and growing, the day side, and every pull of the simulation's own taken away.
 fn all(problem: &Problem) -> Vec<Unlisted> {
     let own = &problem.baseline;
-    let steady = Direction::ALL.map(Unlisted::Steady);
-    let waves = Direction::ALL.map(Unlisted::PerRevolution);
     let bodies = [(Term::Sun, Unlisted::NoSun), (Term::Moon, Unlisted::NoMoon)];
     let bodies = bodies.into_iter().filter(|(term, _)| own.known.contains(term)).map(|(_, away)| away);
     let degrees = (2..=own.degree).map(|from| Unlisted::NoDegrees(from, own.degree));
-    steady.into_iter().chain(waves).chain(bodies).chain(degrees).collect()
+    pushes().chain(bodies).chain(degrees).collect()
 }
