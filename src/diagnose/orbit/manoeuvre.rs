@@ -96,11 +96,13 @@ fn believe(problem: &Problem, arc: &Arc, tried: &ArcFit, [was, rival]: [f64; 2])
     let small = tried.impulses.iter().any(|impulse| impulse.dv_m_s.norm() < least_m_s(arc));
     // What leaves nothing but the stated error of so much more is no push that lasts, however small.
     let clean = is <= CLEAN * 3f64.sqrt() * problem.sigma_m && is < CLEAN_LEFT * was;
-    if (small && !clean) || is > LEFT_MAX * was {
+    // Of several small ones no push that changes could be told.
+    let alone = tried.impulses.len() == 1;
+    if (small && !(clean && alone)) || is > LEFT_MAX * was {
         return false;
     }
     // Several take much from anything: there they must leave what the stated accuracy allows.
-    let provisional = tried.impulses.len() == 1 && is < PROVISIONAL * was && is < PROVISIONAL * rival;
+    let provisional = alone && is < PROVISIONAL * was && is < PROVISIONAL * rival;
     (is <= problem.rms_max_m() || provisional) && score(arc, tried, tried.impulses.len(), [was, is]) > SCORE_MIN
 }
 
