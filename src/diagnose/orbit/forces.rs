@@ -294,7 +294,7 @@ impl Moment {
                 [b * cos * self.sunlit, b * sin * self.sunlit]
             }
             Term::Drag => [self.drag(environment.air), zero],
-            Term::Bulge => [self.drag(environment.air) * self.from_the_bulge(), zero],
+            Term::Bulge => [self.drag(environment.air) * self.cosine_from_bulge(), zero],
             Term::Unlisted(unlisted) => self.unlisted(environment, unlisted),
         }
     }
@@ -339,7 +339,7 @@ impl Moment {
     }
 
     /// Cosine of the angle from the bulge's apex: the Sun's direction turned 30 degrees eastward.
-    fn from_the_bulge(&self) -> f64 {
+    fn cosine_from_bulge(&self) -> f64 {
         let sun = self.bodies.sun_m.normalize();
         let pole = self.pole();
         let (sin, cos) = 30_f64.to_radians().sin_cos();
