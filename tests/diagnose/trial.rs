@@ -94,7 +94,8 @@ fn what_a_simulation_has_twice_is_no_omission_and_its_formula_is_what_was_fitted
         let found = analysed(&case, 0).diagnosis;
         assert_eq!((found.verdict, found.effects.len()), (Verdict::Unexplained, 0), "{found:?}");
         let hypothesis = found.hypothesis.expect("a formula");
-        let fraction = hypothesis.formula.strip_prefix("gravity_gradient with fraction = ").expect("its own formula");
+        let equation = format!("({}) with fraction = ", gravity_gradient::EFFECT.equation);
+        let fraction = hypothesis.formula.strip_prefix(&equation).expect("its own formula");
         let fraction: f64 = fraction.split('(').next().unwrap().parse().unwrap();
         assert!((fraction + 1.0).abs() < 0.05, "{hypothesis:?}");
         assert!(found.notes.iter().any(|note| note.starts_with("gravity_gradient is refused")), "{:?}", found.notes);

@@ -82,13 +82,18 @@ fn best(problem: &Problem, baseline: &Baseline, from: &[ArcFit]) -> Option<(Unli
     let one =
         |i: usize| problem.arcs[i].fit(&problem.environment, baseline, &baseline.estimated, &terms, Some(&from[i]));
     let bare: Vec<ArcFit> = shared_work::map_range(problem.arcs.len(), one);
-    let each = |one: &Unlisted| -> Vec<f64> {
-        problem.arcs.iter().zip(&bare).map(|(arc, fit)| evidence(arc, fit, Term::Unlisted(*one))).collect()
+    let each = |one: Unlisted| -> (Unlisted, Vec<f64>) {
+        let of_arcs = problem.arcs.iter().zip(&bare);
+        (one, of_arcs.map(|(arc, fit)| evidence(arc, fit, Term::Unlisted(one))).collect())
     };
+    let all = shared_work::map(&all, |one| each(*one));
     // Which of them by all that the arcs say; how much they are asked for by no more than one arc may say.
-    let most = all.into_iter().max_by(|a, b| each(a).iter().sum::<f64>().total_cmp(&each(b).iter().sum::<f64>()));
-    let scored = most.map(|term| (term, compare::asked_for(each(&term))));
-    let (term, score) = scored.filter(|(_, score)| *score > SCORE_MIN)?;
+    let sum = |(_, each): &(Unlisted, Vec<f64>)| each.iter().sum::<f64>();
+    let (term, each) = all.into_iter().max_by(|a, b| sum(a).total_cmp(&sum(b)))?;
+    let score = compare::asked_for(each);
+    if score <= SCORE_MIN {
+        return None;
+    }
     let baseline = with(baseline, Term::Unlisted(term));
     let level = problem.fit(&baseline, Vec::new(), Some(&bare));
     Some((term, score, level))
