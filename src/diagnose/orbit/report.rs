@@ -72,7 +72,8 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
         false_alarm_probability,
         located: located(problem, search, &arcs, nothing),
         alternatives: alternatives(search, &table),
-        hypothesis: formula::hypothesis(problem, search),
+        // Where the rest is explained, the arc's own note has what one satellite has for itself.
+        hypothesis: if verdict == Verdict::Unexplained { formula::hypothesis(problem, search) } else { None },
         unit: "m".to_owned(),
         fit: fit(problem, first, end),
         upper_limits: limits(problem, search, end),
