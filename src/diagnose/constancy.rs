@@ -4,7 +4,7 @@
 //! The fitted series of every member is tried times each of what it might follow, one coefficient each, beside the set.
 
 use super::case::HALF_WINDOW_S;
-use super::catalogue::Shape;
+use super::catalogue::{LOGGED_PUSHES, Shape};
 use super::design::{Chosen, Column, Frame, Raw};
 use super::instants::still_warm;
 use super::measure::{coverage, union};
@@ -17,9 +17,6 @@ const SIZE: f64 = 0.5;
 const LOG_PRIOR: f64 = -4.0;
 /// Times in which a push recovers from the one before, s: a factor of five apart, between which a decay is much the same.
 const PAUSES_S: [f64; 2] = [300.0, 1500.0];
-/// Effects that push while an entry of the log lasts, and the kind of it.
-const PUSHES: [(&str, &str); 3] =
-    [("water_dump", "water_dump"), ("evaporator_venting", "evaporator"), ("thruster_residual", "thruster")];
 
 /// A member whose size follows something.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +51,7 @@ pub fn follows_most(scene: &Scene, frame: &Frame, entries: &[Entry], set: &Set) 
         if set.members[member].linear() == 0 {
             return None;
         }
-        let kind = PUSHES.iter().find(|(id, _)| *id == effect.id).map(|(_, kind)| *kind);
+        let kind = LOGGED_PUSHES.iter().find(|(id, _)| *id == effect.id).map(|(_, kind)| *kind);
         let tried = covariates.iter().filter(|c| c.of_kind.is_none() || c.of_kind == kind);
         let (tried, changed): (Vec<&Covariate>, Vec<Raw>) =
             tried.filter_map(|c| Some((c, changed(series, c)?))).unzip();
@@ -127,7 +124,7 @@ fn covariates(s: &Scene) -> Vec<Covariate> {
         add(&format!("the local vertical's {axis}"), s.measure_scalar(|g| (s.body[g] * s.r_m[g].normalize())[k]));
         add(&format!("the Sun's {axis}"), s.measure_scalar(|g| (s.body[g] * s.sun[g])[k]));
     }
-    for (_, kind) in PUSHES {
+    for (_, kind) in LOGGED_PUSHES {
         of_entries(s, kind, &mut all);
     }
     all

@@ -146,7 +146,8 @@ impl EarthOrientation {
             let &[mjd_utc, xp, yp, ut1_utc, dx, dy] = finite.as_slice() else {
                 return Err(EarthOrientationError::Line { line: i + 1, found: line.to_owned() });
             };
-            // UTC is kept within 0.9 s of UT1, and the pole within a second of arc of its reference.
+            // UTC is kept within 0.9 s of UT1, the pole is within a second of arc of its reference and some milliseconds of its model: another
+            // unit is beyond these.
             for (what, found, most, unit) in [
                 ("xp", xp, 1.0, "arcsec"),
                 ("yp", yp, 1.0, "arcsec"),
@@ -257,6 +258,17 @@ mod tests {
     const EOP: &str = "mjd_utc,xp_arcsec,yp_arcsec,ut1_minus_utc_s,dx_mas,dy_mas\n\
         54194,0.0349282,0.4833163,-0.072073685,0.1750,-0.2259\n54195,0.0349282,0.4833163,-0.072073685,0.1750,-0.2259\n\
         54196,0.0349282,0.4833163,-0.072073685,0.1750,-0.2259\n";
+
+    #[test]
+    fn what_the_earth_never_has_is_refused_with_its_place() {
+        // The pole in milliseconds of arc, UT1-UTC as TAI-UTC.
+        for (had, has, said) in
+            [("0.4833163", "483.3163", "line 2: yp is 483.3163"), ("-0.072073685", "33.1", "line 2: UT1-UTC is 33.1")]
+        {
+            let error = EarthOrientation::from_csv(&EOP.replacen(had, has, 1)).unwrap_err().to_string();
+            assert!(error.starts_with(said), "{error}");
+        }
+    }
 
     #[test]
     fn the_rotation_is_that_of_the_sofa_cookbook() {

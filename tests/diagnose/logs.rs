@@ -104,5 +104,5 @@ fn acts_that_are_always_logged_together_are_told_apart_by_one_alone() {
     }
     let told = found.separating_observation.expect("what would decide");
     assert_eq!(told.kind, "log", "{told:?}");
-    assert!(told.text.starts_with("Have one water dump of ") && told.gain.unwrap() > 3.0, "{told:?}");
+    assert!(told.text.starts_with("Have one act of kind water_dump, of ") && told.gain.unwrap() > 3.0, "{told:?}");
 }

@@ -81,7 +81,7 @@ pub struct Satellite {
 }
 
 impl Satellite {
-    pub fn fly(&self, environment: &Environment, baseline: &Baseline, t_s: &[f64]) -> Vec<State> {
+    fn fly(&self, environment: &Environment, baseline: &Baseline, t_s: &[f64]) -> Vec<State> {
         let mut states = fly(environment, baseline, &self.terms, self.start, t_s, None);
         for kick in &self.kicks {
             let last = t_s.partition_point(|t| *t < kick.at_s) - 1;
@@ -121,7 +121,8 @@ impl Made {
         Self { date, spacing_s: 900.0, hours, satellites, finer: Finer::ALL, air: Air::MEAN, noise_m: SIGMA_M, known }
     }
 
-    pub fn sp3(&self) -> String {
+    /// Epochs, s, and the states of every satellite there, with where they fly and from when on.
+    pub fn flown(&self) -> (Vec<f64>, Vec<Vec<State>>, Environment, GpsInstant) {
         let (year, month, day) = self.date;
         let origin = GpsInstant::from_calendar(year, month, day, 0.0).expect("a date");
         let eop = EarthOrientation::from_csv(&orientation(origin.mjd)).expect("orientation");
@@ -131,7 +132,13 @@ impl Made {
         (environment.finer, environment.air) = (self.finer, self.air);
         let t_s: Vec<f64> = (0..=(span_s / self.spacing_s) as usize).map(|i| i as f64 * self.spacing_s).collect();
         let baseline = Baseline { degree: 12, known: self.known.clone(), estimated: Vec::new() };
-        let flown: Vec<Vec<State>> = self.satellites.iter().map(|s| s.fly(&environment, &baseline, &t_s)).collect();
+        let flown = self.satellites.iter().map(|s| s.fly(&environment, &baseline, &t_s)).collect();
+        (t_s, flown, environment, origin)
+    }
+
+    pub fn sp3(&self) -> String {
+        let (year, month, day) = self.date;
+        let (t_s, flown, environment, origin) = self.flown();
         let mut rng = ChaCha12Rng::seed_from_u64(5);
         let mut normal = || ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0) * self.noise_m;
         let mut text = format!("#cV{year:4} {month:2} {day:2}  0  0  0.00000000     {:3} ORBIT MADE\n", t_s.len());

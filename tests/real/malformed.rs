@@ -313,6 +313,9 @@ fn an_orbit_that_cannot_be_used_is_refused_with_its_place() {
     );
     let few = format!("{ORBIT}satellites = [\"G99\"]\n");
     assert!(refused(&few, &[("a.sp3", &sp3), ("eop.csv", &eop), ("a.gfc", &gfc)]).contains("G99"));
+    let short = format!("{ORBIT}fit_hours = 0.5\n");
+    let short = refused(&short, &[("a.sp3", &sp3), ("eop.csv", &eop), ("a.gfc", &gfc)]);
+    assert!(short.ends_with("usable positions to fit, expected at least 12"), "{short}");
 }
 
 // ---- poses

@@ -3,12 +3,10 @@
 use nalgebra::Vector3;
 use oare_ground::diagnose::answer::Verdict;
 use oare_ground::diagnose::orbit::arc::Impulse;
-use oare_ground::diagnose::orbit::forces::{Air, Baseline, Direction, Environment, Term, Unlisted};
-use oare_ground::physics::earth_orientation::{EarthOrientation, GpsInstant};
-use oare_ground::physics::gravity_field::GravityField;
+use oare_ground::diagnose::orbit::forces::{Air, Direction, Term, Unlisted};
 
 use super::ids;
-use super::made::{ALL, Made, SIGMA_M, circular, close, field, gps, low, orientation, without};
+use super::made::{ALL, Made, SIGMA_M, circular, close, gps, low, without};
 
 fn three() -> Vec<super::made::Satellite> {
     vec![gps("G01", 0.0, 10.0), gps("G02", 120.0, 200.0), gps("G03", 240.0, 320.0)]
@@ -118,17 +116,11 @@ fn what_an_odd_satellite_alone_asks_for_and_is_not_explained_by_is_not_named() {
     for satellite in &mut satellites {
         satellite.terms = vec![(Term::SolarRadiation, [9.1e-8, 0.0])];
     }
-    let origin = GpsInstant::from_calendar(2018, 2, 21, 0.0).unwrap();
-    let eop = EarthOrientation::from_csv(&orientation(origin.mjd)).unwrap();
-    let gravity = GravityField::from_gfc(&field(), origin.mjd).unwrap();
-    let environment = Environment::new(origin, 108_000.0, &eop, gravity).unwrap();
-    let baseline = Baseline { degree: 12, known: vec![Term::Sun, Term::Moon], estimated: Vec::new() };
-    let t_s: Vec<f64> = (0..=120).map(|i| 900.0 * f64::from(i)).collect();
-    let states = satellites[0].fly(&environment, &baseline, &t_s);
+    let mut made = Made::every_quarter((2018, 2, 21), 30.0, satellites);
+    let (t_s, flown, ..) = made.flown();
     // Pushed along its track for eight hours.
-    let places = (60..92).step_by(2);
-    satellites[0].kicks = places.map(|k| Impulse { at_s: t_s[k], dv_m_s: states[k].v.normalize() * 2e-4 }).collect();
-    let made = Made::every_quarter((2018, 2, 21), 30.0, satellites);
+    let kick = |k: usize| Impulse { at_s: t_s[k], dv_m_s: flown[0][k].v.normalize() * 2e-4 };
+    made.satellites[0].kicks = (60..92).step_by(2).map(kick).collect();
     let answer = made.diagnose(&["gravity:12", "sun", "moon", "solar_radiation_pressure"]);
     assert_eq!((answer.verdict, ids(&answer)), (Verdict::Unexplained, vec![]), "{:?}", answer.effects);
     let verdicts: Vec<Verdict> = answer.arcs.iter().map(|a| a.verdict).collect();

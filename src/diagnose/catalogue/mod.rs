@@ -402,6 +402,13 @@ pub fn in_sensor(scene: &Scene, at: impl Fn(&[f64]) -> Vec<f64>) -> Shape {
 /// Kinds of entries in the log that effects of the catalogue go by.
 pub const LOGGED_KINDS: [&str; 4] = [water_dump::KIND, evaporator_venting::KIND, "thruster", "crew_sleep"];
 
+/// Effects that push while an entry of the log lasts, and the kind of it.
+pub const LOGGED_PUSHES: [(&str, &str); 3] = [
+    ("water_dump", water_dump::KIND),
+    ("evaporator_venting", evaporator_venting::KIND),
+    ("thruster_residual", "thruster"),
+];
+
 /// The kind of entries in the log that an effect acts by, and by nothing else.
 pub fn logged_kind(id: &str) -> Option<&'static str> {
     match id {

@@ -16,7 +16,7 @@ const EVALUATIONS: usize = 18;
 
 /// The search again in air that explains more, if drag was found and there is such.
 pub fn settled(problem: &mut Problem, search: Search) -> Search {
-    let last = &search.levels[search.levels.len() - 1];
+    let last = search.last();
     if !last.accepted.iter().any(|(term, _)| *term == Term::Drag) {
         return search;
     }

@@ -17,12 +17,13 @@ const SIDE: usize = 4;
 const NEAR_STEPS: f64 = 5.5;
 /// Error of what an epoch is off the polynomial through four even neighbours on either side, over that of a position.
 const IN_THE_MIDDLE: f64 = 1.63;
-
 /// Times the stated accuracy from which on the scatter that positions show is believed instead.
 const BELIEVED: f64 = 1.5;
 /// White noise scatters about polynomials through six neighbours and through eight by the same error, but for this factor; what is smooth does
 /// not.
 const ALIKE: f64 = 1.2;
+/// Fewest positions that say what they scatter by: to a tenth.
+const FEWEST: usize = 60;
 /// Median length of a vector of three normal deviates.
 const MEDIAN_LENGTH: f64 = 1.538;
 
@@ -50,7 +51,6 @@ pub fn leave_out(problem: &mut Problem) {
 /// Error of a coordinate by what positions are off the polynomials through their neighbours, m; none where that is not noise, or there are
 /// too few.
 fn scatter_m<'a>(arcs: impl Iterator<Item = (&'a [f64], &'a [Vector3<f64>])>) -> Option<f64> {
-    const FEWEST: usize = 60;
     let mut misses: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
     for (t_s, left_m) in arcs {
         let usual_s = median(t_s.windows(2).map(|pair| pair[1] - pair[0]));
@@ -60,11 +60,8 @@ fn scatter_m<'a>(arcs: impl Iterator<Item = (&'a [f64], &'a [Vector3<f64>])>) ->
             });
             for (side, misses) in [SIDE - 1, SIDE].into_iter().zip(&mut misses).filter(|_| is_even) {
                 let near: Vec<usize> = (i - side..=i + side).filter(|j| *j != i).collect();
-                let nodes: Vec<f64> = near.iter().map(|j| t_s[*j] - t_s[i]).collect();
-                let weights = lagrange_weights(&nodes, 0.0);
-                let through: Vector3<f64> = near.iter().zip(&weights).map(|(j, w)| left_m[*j] * *w).sum();
-                let error = (1.0 + weights.iter().map(|w| w * w).sum::<f64>()).sqrt();
-                misses.push((through - left_m[i]).norm() / error / MEDIAN_LENGTH);
+                let [off_m, error] = off_polynomial(t_s, left_m, i, &near);
+                misses.push(off_m / error / MEDIAN_LENGTH);
             }
         }
     }
@@ -98,11 +95,17 @@ fn miss(t_s: &[f64], left_m: &[Vector3<f64>], (i, without): (usize, Option<usize
         return None;
     }
     let around = [before, after].concat();
-    let nodes: Vec<f64> = around.iter().map(|j| t_s[*j] - t_s[i]).collect();
+    let [off_m, error] = off_polynomial(t_s, left_m, i, &around);
+    Some(off_m * (IN_THE_MIDDLE / error).min(1.0))
+}
+
+/// What an epoch is off the polynomial through some others, m, and the error of that over the error of a position.
+fn off_polynomial(t_s: &[f64], left_m: &[Vector3<f64>], i: usize, others: &[usize]) -> [f64; 2] {
+    let nodes: Vec<f64> = others.iter().map(|j| t_s[*j] - t_s[i]).collect();
     let weights = lagrange_weights(&nodes, 0.0);
-    let through: Vector3<f64> = around.iter().zip(&weights).map(|(j, w)| left_m[*j] * *w).sum();
+    let through: Vector3<f64> = others.iter().zip(&weights).map(|(j, w)| left_m[*j] * *w).sum();
     let error = (1.0 + weights.iter().map(|w| w * w).sum::<f64>()).sqrt();
-    Some((through - left_m[i]).norm() * (IN_THE_MIDDLE / error).min(1.0))
+    [(through - left_m[i]).norm(), error]
 }
 
 #[cfg(test)]

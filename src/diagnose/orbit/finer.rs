@@ -18,7 +18,7 @@ pub fn settled(problem: &mut Problem) -> Search {
     let search = problem.search(&mut |_| ());
     // Radiation imitates what is lacking or too much: nothing but an explanation without it shows that it was no more than that.
     let imitated = |term: &Term| matches!(term, Term::YBias | Term::BBias | Term::OncePerRev | Term::Drag);
-    let last = &search.levels[search.levels.len() - 1];
+    let last = search.last();
     if problem.environment.finer != Finer::ALL || !last.accepted.iter().any(|(term, _)| imitated(term)) {
         return search;
     }

@@ -66,7 +66,7 @@ fn of_all(rows: &[Vec<Estimate>], k: usize) -> String {
 
 fn place(problem: &Problem, search: &Search, found: &Found, end: &Level) -> String {
     let n = problem.arcs.len();
-    let last = &search.levels[search.levels.len() - 1];
+    let last = search.last();
     let of = if n > 1 { format!(" (median of {n})") } else { String::new() };
     let mut words = match found.term {
         Unlisted::Steady(_) | Unlisted::PerRevolution(_) | Unlisted::Growing(_) | Unlisted::DaySide => {
@@ -98,7 +98,7 @@ fn place(problem: &Problem, search: &Search, found: &Found, end: &Level) -> Stri
         ));
     }
     if found.term == Unlisted::Steady(Direction::Along) && found.instead_of.contains(&Term::Drag) {
-        words.push_str(" No air that thins with height pushes so.");
+        words.push_str(" Air of no scale height that was tried pushes so.");
     }
     words
 }

@@ -106,14 +106,14 @@ fn believe(problem: &Problem, arc: &Arc, tried: &ArcFit, [was, rival]: [f64; 2])
     (is <= problem.rms_max_m() || provisional) && score(arc, tried, tried.impulses.len(), [was, is]) > SCORE_MIN
 }
 
-/// Take out the velocity steps that did not leave what the stated accuracy allows in the end.
-pub fn unproven(problem: &Problem, level: &Level) -> Vec<usize> {
-    let odd = |i: &usize| {
-        let (arc, fit) = (&problem.arcs[*i], &level.fits[*i]);
-        let needless = || described(problem, level, *i).iter().any(|one| one.score <= SCORE_MIN);
+/// Whether any arc has velocity steps that do not leave what the stated accuracy allows in the end, or one that it can do without.
+pub fn has_unproven(problem: &Problem, level: &Level) -> bool {
+    let odd = |i: usize| {
+        let (arc, fit) = (&problem.arcs[i], &level.fits[i]);
+        let needless = || described(problem, level, i).iter().any(|one| one.score <= SCORE_MIN);
         !fit.impulses.is_empty() && (fit.rms_m(0..arc.fitted) > problem.rms_max_m() || needless())
     };
-    (0..problem.arcs.len()).filter(odd).collect()
+    (0..problem.arcs.len()).any(odd)
 }
 
 /// What was found, with the errors of the last level.

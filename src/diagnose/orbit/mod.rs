@@ -110,7 +110,7 @@ pub fn diagnose(case: &MeasuredCase, files: &BTreeMap<String, String>) -> Result
 pub fn searched(problem: &mut Problem) -> Search {
     let search = finer::settled(problem);
     let search = beside_the_catalogue(problem, search);
-    let last = &search.levels[search.levels.len() - 1];
+    let last = search.last();
     let drag = last.accepted.iter().any(|(term, _)| *term == Term::Drag);
     let Environment { finer, air, .. } = problem.environment;
     if finer == Finer::ALL || !(drag || search.unlisted.is_some()) {

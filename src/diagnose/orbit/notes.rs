@@ -33,7 +33,7 @@ pub fn notes(problem: &Problem, arcs: &[ArcAnswer], search: &Search) -> Vec<Stri
             .to_owned(),
         finer(problem.environment.finer).to_owned(),
     ];
-    let last = &search.levels[search.levels.len() - 1];
+    let last = search.last();
     let of_panels = |term: &Term| matches!(term, Term::YBias | Term::BBias | Term::OncePerRev);
     if last.accepted.iter().map(|(term, _)| term).chain(&problem.baseline.estimated).any(of_panels) {
         notes.push(

@@ -48,23 +48,19 @@ fn of_arc(problem: &Problem, level: &Level, i: usize) -> Option<Own> {
     if problem.arcs.len() == 1 || !fit.impulses.is_empty() || !was.is_finite() || was <= problem.rms_max_m() {
         return None;
     }
-    let tried = |term: Term, wide: &ArcFit| {
-        let with = problem.fit_arc(arc, &with(&level.baseline, term), Some(fit));
+    let free = problem.candidates(&level.baseline).into_iter().filter(|term| !term.is_known_size());
+    let terms: Vec<Term> = free.chain(pushes().map(Term::Unlisted)).collect();
+    let wide = arc.fit(&problem.environment, &level.baseline, &level.baseline.estimated, &terms, Some(fit));
+    let tried = |term: &Term| {
+        let with = problem.fit_arc(arc, &with(&level.baseline, *term), Some(fit));
         let is = with.rms_m(0..arc.fitted);
         let foretold = no_worse_foretold(arc, [fit, &with]);
-        let own = Own { arc: i, term, score: evidence(arc, wide, term), rms_m: [was, is], fit: with };
+        let own = Own { arc: i, term: *term, score: evidence(arc, &wide, *term), rms_m: [was, is], fit: with };
         (foretold && is <= problem.rms_max_m() && is < LEFT_MAX * was && own.score > SCORE_MIN).then_some(own)
     };
-    let free = problem.candidates(&level.baseline).into_iter().filter(|term| !term.is_known_size());
-    let unlisted = pushes().map(Term::Unlisted);
-    let all_terms: Vec<Term> = free.chain(unlisted).collect();
-    let wide = arc.fit(&problem.environment, &level.baseline, &level.baseline.estimated, &all_terms, Some(fit));
-    let mut all: Vec<Own> = all_terms.iter().filter_map(|term| tried(*term, &wide)).collect();
+    let mut all: Vec<Own> = terms.iter().filter_map(tried).collect();
     all.sort_by(|a, b| b.score.total_cmp(&a.score));
-    // A formula that does better than every name, or as well as the only one, is no doubt about it: it is what is told.
-    let best = all.first()?;
-    let second = all.iter().skip(1).find(|own| own.is_listed()).map_or(f64::NEG_INFINITY, |own| own.score);
-    let other = all.get(1).map_or(f64::NEG_INFINITY, |own| own.score);
-    let stands = if best.is_listed() { best.score > other + MARGIN } else { best.score > second };
-    all.into_iter().next().filter(|_| stands)
+    // A name must be above all else by a margin. A formula is none: the first of all is what is told.
+    let second = all.get(1).map_or(f64::NEG_INFINITY, |own| own.score);
+    all.into_iter().next().filter(|own| !own.is_listed() || own.score > second + MARGIN)
 }

@@ -88,7 +88,7 @@ pub fn answer(case: &str, problem: &Problem, search: &Search) -> Answer {
 
 /// Chance that noise leaves what is unexplained.
 fn chance_of_the_odd(problem: &Problem, search: &Search, arcs: &[ArcAnswer]) -> f64 {
-    let last = &search.levels[search.levels.len() - 1];
+    let last = search.last();
     let odd = (0..arcs.len()).filter(|i| arcs[*i].verdict == Verdict::Unexplained);
     let least = odd.map(|i| compare::log_chance(problem, i, &last.fits[i])).fold(0.0, f64::min);
     let of_formula = search.unlisted.as_ref().map_or(0.0, |found| -0.5 * found.score);
@@ -242,7 +242,7 @@ fn arc_answer(problem: &Problem, search: &Search, [first, end]: [&Level; 2], tab
         .extend(search.manoeuvres.iter().filter(|one| one.arc == i).map(|one| manoeuvre_effect(problem, one, false)));
     effects.extend(search.own.iter().filter(|one| one.arc == i).map(|one| own_effect(problem, end, one, false)));
     let left = rms_after > problem.rms_max_m();
-    let without = &search.levels[search.levels.len() - 1].fits[i];
+    let without = &search.last().fits[i];
     let by_formula = search.unlisted.is_some() && compare::of_arc(problem, i, fit, without) > 0.0;
     let alone = search.alone.iter().find(|one| one.arc == i);
     let (verdict, effects, fitted_beside, note) = if left {
@@ -400,7 +400,7 @@ fn located(problem: &Problem, search: &Search, arcs: &[ArcAnswer], nothing: bool
     let interval = |arc: &&ArcAnswer| {
         let place = problem.arcs.iter().position(|a| a.id == arc.id)?;
         let own = &problem.arcs[place];
-        let left_m = search.levels[search.levels.len() - 1].fits[place].rms_m(0..own.fitted);
+        let left_m = search.last().fits[place].rms_m(0..own.fitted);
         let has_formula = search.unlisted.is_some() || search.alone.iter().any(|one| one.arc == place);
         let of_arc = if has_formula { None } else { manoeuvre::span(problem, &search.end(), place) };
         let Some(([start_s, end_s], would_m)) = of_arc else {

@@ -88,9 +88,14 @@ pub struct Search {
 }
 
 impl Search {
-    /// The last level, with what single satellites have for themselves.
+    /// The last level.
+    pub fn last(&self) -> &Level {
+        &self.levels[self.levels.len() - 1]
+    }
+
+    /// The same with what no catalogue has, and with what single satellites have for themselves.
     pub fn end(&self) -> Level {
-        let last = &self.levels[self.levels.len() - 1];
+        let last = self.last();
         let mut end = last.clone();
         if let Some(found) = &self.unlisted {
             end = Level { accepted: last.accepted.clone(), ..found.level.clone() };
@@ -134,7 +139,7 @@ impl Problem {
     pub fn search(&self, report: &mut dyn FnMut(usize)) -> Search {
         let found = self.search_with(true, report);
         // A velocity step taken on the way that leaves an arc odd in the end may have misled the rest: once more without.
-        if manoeuvre::unproven(self, &found.levels[found.levels.len() - 1]).is_empty() {
+        if !manoeuvre::has_unproven(self, found.last()) {
             return found;
         }
         self.search_with(false, report)

@@ -100,9 +100,8 @@ fn no_kilometres(satellites: &BTreeMap<String, BTreeMap<i64, Found>>) -> Option<
     if all.clone().any(|(_, one)| one.usable) {
         return None;
     }
-    let written = |one: &Found| {
-        one.fixed_m.norm() > 0.0 && one.fixed_m.iter().all(|x| x.abs() != ABSENT_KM * 1000.0 + 999.999_999)
-    };
+    let is_absent = |x: &f64| (x.abs() / 1000.0 - ABSENT_KM).abs() < 1.0;
+    let written = |one: &Found| one.fixed_m.norm() > 0.0 && !one.fixed_m.iter().any(is_absent);
     let (id, one) = all.find(|(_, one)| written(one))?;
     let km = one.fixed_m.norm() / 1000.0;
     Some(format!("a position in km, 6000 to 999999 from the Earth's centre: that of {id} is {km:.3}"))

@@ -20,11 +20,11 @@ use crate::physics::orbit::{self, State};
 use crate::physics::{J2, Vec3, drag, gravity_gradient, rotation};
 use crate::units::NANO_G_M_S2;
 
-use self::outcome::{Action, Candidate, Outcome, Pair, WARMER_C, round};
+use self::outcome::{ACT_EVERY_S, Action, Candidate, Outcome, Pair, WARMER_C, round};
 use super::answer::SeparatingObservation;
 use super::axes;
 use super::case::{Ancillary, Case, Event, Expectation, Simulation, WINDOW_STRIDE_S};
-use super::catalogue::{Effect, Shape, Theta};
+use super::catalogue::{Effect, LOGGED_PUSHES, Shape, Theta};
 use super::design::{Chosen, Column, Frame, Raw};
 use super::noise::AxisNoise;
 use super::scene::{Axes, Scene, Surroundings};
@@ -43,15 +43,8 @@ const LOG_SHOWS: [f64; 2] = [0.95, 0.02];
 const THETA_STEPS: f64 = 10.0;
 /// Effects that are born in the sensor and turn with it.
 const SENSOR_BORN: [&str; 3] = ["bias_step", "bias_drift", "temperature_bias"];
-/// Effects that last as long as an act of the log: the kind of its entries, the name of one and of several.
-const LOGGED: [(&str, &str, [&str; 2]); 3] = [
-    ("water_dump", "water_dump", ["water dump", "water dumps"]),
-    ("evaporator_venting", "evaporator", ["cycle of the evaporator", "cycles of the evaporator"]),
-    ("thruster_residual", "thruster", ["firing of the thrusters", "firings of the thrusters"]),
-];
-/// Such an act begins so long after the turn and every so often from there on, s.
+/// An act of the log begins so long after the turn, s.
 const ACT_AFTER_S: f64 = 1800.0;
-const ACT_EVERY_S: f64 = 5400.0;
 /// Attitudes to the local vertical (x forward, y opposite the orbit normal, z down): roll, pitch, yaw in degrees, and in words.
 const ATTITUDES: [([f64; 3], &str); 6] = [
     ([0.0, 0.0, 0.0], "nose forward, belly to the Earth"),
@@ -114,10 +107,10 @@ fn acts(scene: &Scene, rivals: &[Rival]) -> Vec<Action> {
         let has = rivals.iter().filter(|rival| rival.iter().any(|part| part.effect.id == id)).count();
         0 < has && has < rivals.len()
     };
-    let logged = LOGGED.into_iter().filter(|(id, ..)| some(id)).filter_map(|(_, kind, name)| {
+    let logged = LOGGED_PUSHES.into_iter().filter(|(id, _)| some(id)).filter_map(|(_, kind)| {
         let events = scene.case.events.iter().filter(|event| event.kind == kind && event.duration_s > 0.0);
         let mut durations_s: Vec<f64> = events.map(|event| event.duration_s).collect();
-        Some(Action::Again(kind, name, robust::median(&mut durations_s)?))
+        Some(Action::Again(kind, robust::median(&mut durations_s)?))
     });
     logged.chain(some("temperature_bias").then_some(Action::Warm)).collect()
 }
@@ -349,7 +342,7 @@ fn to_come(scene: &Scene, action: Action, hours: f64) -> Option<(Case, Surroundi
         series.truncate(cut);
         series.extend(new);
     }
-    if let Action::Again(kind, _, duration_s) = action {
+    if let Action::Again(kind, duration_s) = action {
         let act = |n: usize| Event {
             clock_s: from_s + TURN_S + ACT_AFTER_S + n as f64 * ACT_EVERY_S,
             duration_s,

@@ -14,13 +14,15 @@ pub(super) enum Action {
     Turn,
     Hold([f64; 3], &'static str),
     Freeze,
-    /// An act that the log has, again and alone: of the kind, its name and that of several, how long, s.
-    Again(&'static str, [&'static str; 2], f64),
+    /// An act that the log has, again and alone: of the kind, how long, s.
+    Again(&'static str, f64),
     /// The sensor warmer by [`WARMER_C`], the attitude held as it is.
     Warm,
 }
 
-/// By how much a sensor is made warmer.
+/// Acts of the log follow one another so, s: what remembers one for a while has an hour to forget it.
+pub(super) const ACT_EVERY_S: f64 = 5400.0;
+/// By how much a sensor is made warmer: the gain is told for so much.
 pub(super) const WARMER_C: f64 = 2.0;
 
 /// An action for so many hours.
@@ -31,9 +33,9 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Acts of the log in it, one every hour and a half.
+    /// Acts of the log in it.
     pub(super) fn acts(&self) -> usize {
-        (self.hours / 1.5).round().max(1.0) as usize
+        (self.hours * 3600.0 / ACT_EVERY_S).round().max(1.0) as usize
     }
 
     /// What it costs, in hours.
@@ -110,14 +112,14 @@ impl Outcome {
                 format!("Hold {words} (local vertical, roll {roll:.0}, pitch {pitch:.0}, yaw {yaw:.0} degrees)"),
             ),
             Action::Freeze => ("attitude", "Hold the present attitude fixed to the stars".to_string()),
-            Action::Again(_, [one, many], duration_s) => (
+            Action::Again(kind, duration_s) => (
                 "log",
                 format!(
-                    "Have {} of {duration_s:.0} s and no other act of the log within half an hour of it, the attitude held as it is,",
-                    if self.candidate.acts() == 1 {
-                        format!("one {one}")
-                    } else {
-                        format!("{} {many}", self.candidate.acts())
+                    "Have {} of kind {kind}, of {duration_s:.0} s, and no other act of the log within half an hour of it, the attitude held \
+                     as it is,",
+                    match self.candidate.acts() {
+                        1 => "one act".to_string(),
+                        n => format!("{n} acts"),
                     }
                 ),
             ),

@@ -6,8 +6,7 @@ use crate::diagnose::search::{self, Entry, Set, Weighed};
 use crate::math::shared_work;
 
 /// Weighs the best set with one member less, and that again, as long as what is left is as good but for `less` in log posterior: what only
-/// described slow noise is found
-/// at one noise together with what is real, and every set kept may hold it. Sets that are not `wanted` are not weighed.
+/// described slow noise is found at one noise together with what is real, and every set kept may hold it. Sets that are not `wanted` are not weighed.
 pub(super) fn lessen(
     scene: &Scene,
     entries: &[Entry],

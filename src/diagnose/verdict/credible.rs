@@ -28,14 +28,11 @@ fn refusal(scene: &Scene, library: &Library, weighed: &Weighed) -> Option<(&'sta
     let mut next = 0;
     let mut reason = None;
     for (i, m) in set.members.iter().enumerate() {
-        for (k, l) in effect_of(&library.entries, &set, i)
-            .iter()
-            .flat_map(|effect| effect.linear.iter().enumerate())
-            .take(m.linear())
-        {
-            let doubt = 2.0 * covariance[(next + k, next + k)].max(0.0).sqrt();
-            let id = effect_of(&library.entries, &set, i).map_or("", |effect| effect.id);
-            reason = l.refuses(mean[next + k], doubt).map(|why| (id, why)).or(reason);
+        if let Some(effect) = effect_of(&library.entries, &set, i) {
+            for (k, l) in effect.linear.iter().enumerate().take(m.linear()) {
+                let doubt = 2.0 * covariance[(next + k, next + k)].max(0.0).sqrt();
+                reason = l.refuses(mean[next + k], doubt).map(|why| (effect.id, why)).or(reason);
+            }
         }
         next += m.linear();
     }
